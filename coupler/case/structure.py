@@ -54,8 +54,13 @@ class Block(Section):
     rotation: Rotation | None = Field(
         None, description="rotation about the centre of mass; absent: aligned with the axes"
     )
-    velocity: VelocityVector = Field((0.0, 0.0, 0.0), description="velocity of the centre at the start")
-    spin: SpinVector = Field((0.0, 0.0, 0.0), description="angular velocity at the start, world axes")
+    velocity: VelocityVector = Field(
+        (0.0, 0.0, 0.0),
+        description="velocity of the centre at the start, of a block that neither is fixed nor has a [[motion]]",
+    )
+    spin: SpinVector = Field(
+        (0.0, 0.0, 0.0), description="angular velocity at the start, world axes, of the same blocks"
+    )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description=MATERIAL)
     fixed: Switch = Field(False, description="true: held in place for the whole run")
@@ -187,7 +192,10 @@ class Arch(Section):
         description="length along the span and depth below the springing of two blocks that the arch stands on, "
         "NAME-low and NAME-high; absent: none",
     )
-    abutment_fixed: Switch = Field(True, description="false: the abutments may move")
+    abutment_fixed: Switch = Field(
+        True,
+        description="false: the abutments may move; one with a [[motion]] moves as prescribed in either case",
+    )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description=MATERIAL)
 

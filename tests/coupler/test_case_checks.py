@@ -271,6 +271,44 @@ def test_a_motion_needs_its_block():
     assert found == ["motion.0.block: there is no block 'b00'; did you mean 'b0'?"]
 
 
+MOVED = {"block": "b0", "velocity": [0.1, 0, 0]}
+
+
+@pytest.mark.parametrize(
+    ("block", "motion", "says"),
+    [
+        (
+            {"fixed": True, "velocity": [1, 0, 0]},
+            [],
+            "structure.block.0.velocity: 'b0' has fixed = true as well, and a block that is held does not move",
+        ),
+        ({"fixed": True, "spin": [0, 0, 1]}, [], "structure.block.0.spin: 'b0' has fixed = true as well"),
+        (
+            {"fixed": True},
+            [MOVED],
+            "motion.0.block: 'b0' of structure.block[0] is held in place for the whole run",
+        ),
+        ({}, [MOVED, MOVED], "motion.1.block: the motion of 'b0' is given by motion[0] already"),
+        (
+            {"velocity": [0, 0, 1]},
+            [MOVED],
+            "motion.0.velocity: 'b0' has a velocity at the start as well (structure.block[0].velocity)",
+        ),
+        ({"spin": [0, 0, 1]}, [MOVED], "motion.0.velocity: 'b0' has a spin at the start as well"),
+    ],
+)
+def test_a_block_has_one_motion(block, motion, says):
+    """A block that is held and moves, or moves in two ways, is a contradiction that nobody resolves in silence."""
+    (found,) = reported(case(motion=motion, **structure({"centre": [7, 5, 0.5], **block})))
+    assert found.startswith(says)
+
+
+def test_a_block_may_be_told_that_it_rests_at_the_start():
+    rests = {"centre": [7, 5, 0.5], "velocity": [0, 0, 0], "spin": [0, 0, 0]}
+    assert reported(case(**structure(rests | {"fixed": True}))) == []
+    assert reported(case(motion=[MOVED], **structure(rests))) == []
+
+
 def test_walls_thinner_than_a_cell_are_remarked():
     """Single covers lose load on walls thinner than a cell; allowed, but not in silence."""
     thin = {"centre": [7, 5, 1], "size": [0.2, 2, 2]}
