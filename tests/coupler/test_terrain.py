@@ -71,6 +71,21 @@ def write_hdf(path):
             file["elevation"].dims[k].attach_scale(file[name])
 
 
+def write_packed(path):
+    """Whole centimetres above a datum along coordinates whose names say the directions only at their beginning; and
+    they are written in the order x, y."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w") as file:
+        for name, values in (("x_utm", X), ("y_utm", Y)):
+            file.createDimension(name, len(values))
+            file.createVariable(name, "h", (name,))[:] = 10 * values
+            file.variables[name].scale_factor = 0.1
+        packed = file.createVariable("elevation", "h", ("x_utm", "y_utm"))
+        packed.scale_factor, packed.add_offset, packed._FillValue = 0.01, -20.0, np.int16(0)
+        packed[:] = np.rint(100 * (Z + 20.0))
+
+
 def write_stl(path):
     import meshio
 
@@ -88,6 +103,7 @@ FORMATS = {
     "g.xyz": (write_xyz, 5e-3),
     "classic.nc": (write_classic, 1e-9),
     "four.nc": (write_hdf, 1e-9),
+    "packed.nc": (write_packed, 5.001e-3),
     "g.stl": (write_stl, 5e-3),
 }
 
@@ -101,6 +117,65 @@ def test_every_format_gives_the_same_ground(name, tmp_path):
     x, y = np.round(x), np.round(y)
     np.testing.assert_allclose(found(x, y), ground(x, y), atol=exact)
     assert np.isnan(found(np.array([99.0]), np.array([55.0]))).all()
+
+
+def write_named(path, coordinates, heights=((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), **more):
+    """A NetCDF file of 2 x 3 heights whose dimensions are called as given, with their attributes."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w") as file:
+        for (name, attributes), count in zip(coordinates.items(), (2, 3)):
+            file.createDimension(name, count)
+            file.createVariable(name, "d", (name,))[:] = np.arange(count)
+            for key, value in attributes.items():
+                setattr(file.variables[name], key, value)
+        z = file.createVariable("z", "d", tuple(coordinates))
+        z[:] = heights
+        for key, value in more.items():
+            setattr(z, key, value)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "turned"),
+    [
+        ({"y": {}}, {"x": {}}, False),
+        ({"x_utm": {}}, {"y_utm": {}}, True),
+        ({"Easting": {}}, {"Northing": {}}, True),
+        ({"latitude": {}}, {"longitude": {}}, False),
+        ({"a": {"axis": b"X"}}, {"b": {"axis": b"Y"}}, True),
+        ({"a": {"standard_name": b"projection_y_coordinate"}}, {"b": {"axis": b"X"}}, False),
+        ({"a": {"units": b"degrees_east"}}, {"b": {"units": b"degrees_north"}}, True),
+    ],
+)
+def test_coordinates_say_which_of_them_is_x(tmp_path, first, second, turned):
+    write_named(tmp_path / "g.nc", first | second)
+    shape = read_grid(tmp_path / "g.nc").z.shape
+    assert shape == ((2, 3) if turned else (3, 2))
+
+
+def test_marks_of_missing_values_are_packed_numbers(tmp_path):
+    """Height 2 is stored as 4 and marked as missing; height 4, stored as 8, is a height."""
+    write_named(
+        tmp_path / "g.nc", {"y": {}, "x": {}}, [[2.0, 4.0, 6.0], [8.0, 10.0, 12.0]],
+        scale_factor=0.5, missing_value=np.array([4.0]),
+    )  # fmt: skip
+    np.testing.assert_array_equal(read_grid(tmp_path / "g.nc").z.T, [[1.0, np.nan, 3.0], [4.0, 5.0, 6.0]])
+
+
+@pytest.mark.parametrize(
+    ("coordinates", "more", "reported"),
+    [
+        ({"a": {}, "b": {}}, {}, "g.nc: of the coordinates 'b' and 'a' of 'z' one must be known as x"),
+        ({"time": {}, "x": {}}, {}, "of the coordinates 'x' and 'time' of 'z' one must be known as x"),
+        ({"x1": {}, "x2": {}}, {}, "one must be known as x, the other as y"),
+        ({"y": {}, "x": {}}, {"scale_factor": 0.0}, "scale_factor = 0 of 'z'"),
+        ({"y": {}, "x": {}}, {"add_offset": b"high"}, "add_offset of 'z' is no number"),
+    ],
+)
+def test_what_a_file_leaves_open_is_refused(tmp_path, coordinates, more, reported):
+    write_named(tmp_path / "g.nc", coordinates, **more)
+    with pytest.raises(TerrainError, match=reported):
+        read_grid(tmp_path / "g.nc")
 
 
 def test_place_of_the_origin_turn_unit_and_datum(tmp_path):

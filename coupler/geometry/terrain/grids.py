@@ -5,6 +5,7 @@ GeoTIFF and whatever else GDAL reads: `raster.py`, in a process of its own.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -223,16 +224,63 @@ def _netcdf(path: Path, variable: str | None) -> Grid:
     for name in (along, across):
         if name not in arrays:
             raise TerrainError(f"{path.name}: no coordinates for '{name}' of '{variable}'")
-    z = np.array(arrays[variable], float)
-    for key in ("_FillValue", "missing_value"):
-        if key in attributes[variable]:
-            z[z == float(np.ravel(attributes[variable][key])[0])] = np.nan
-    x, y = arrays[across], arrays[along]
-    z = z.T
-    if along.lower() in NAMES[0]:
-        x, y, z = y, x, z.T
-    degrees = "degree" in str(attributes[across].get("units", ""))
-    return _even(path, np.array(x, float), np.array(y, float), z, "EPSG:4326" if degrees else "")
+    eastward, northward = _directions(path, variable, (across, along), attributes)
+    x, y = (_unpacked(path, name, arrays[name], attributes[name]) for name in (eastward, northward))
+    z = _unpacked(path, variable, arrays[variable], attributes[variable])
+    degrees = "degree" in _said(attributes[eastward], "units")
+    return _even(path, x, y, z.T if eastward == across else z, "EPSG:4326" if degrees else "")
+
+
+BEGINNINGS = {"x": ("x", "lon", "east", "projection_x"), "y": ("y", "lat", "north", "projection_y")}
+"""Beginnings of the names of the coordinates that count along x and along y."""
+COMPASS = {"x": re.compile(r"degrees?_?e(ast)?"), "y": re.compile(r"degrees?_?n(orth)?")}
+"""Units that say a direction, in the spellings of the CF conventions."""
+
+
+def _directions(path: Path, variable: str, names: tuple[str, str], attributes: dict) -> tuple[str, str]:
+    """The names of the two coordinates that count along x and along y, by their attributes or else by their names."""
+    found = {_direction(name, attributes[name]): name for name in names}
+    if set(found) != {"x", "y"}:
+        raise TerrainError(
+            f"{path.name}: of the coordinates '{names[0]}' and '{names[1]}' of '{variable}' one must be known as x, "
+            "the other as y: by names that begin with x, lon or east and with y, lat or north, or by the attribute "
+            "axis, X or Y"
+        )
+    return found["x"], found["y"]
+
+
+def _direction(name: str, attributes: dict) -> str | None:
+    """x or y, where a coordinate says which of the two it is."""
+    axis, known, unit = (_said(attributes, key) for key in ("axis", "standard_name", "units"))
+    for letter, beginnings in BEGINNINGS.items():
+        if axis == letter or known.startswith(beginnings) or COMPASS[letter].fullmatch(unit):
+            return letter
+    return next((k for k, beginnings in BEGINNINGS.items() if name.lower().startswith(beginnings)), None)
+
+
+def _said(attributes: dict, key: str) -> str:
+    """The text of an attribute in small letters; empty where there is none."""
+    return str(_plain(np.ravel(attributes.get(key, ""))[0])).strip().lower()
+
+
+def _unpacked(path: Path, name: str, packed: Array, attributes: dict) -> Array:
+    """Values of a variable by the CF conventions: NaN where there is none, else packed * scale_factor + add_offset. The
+    marks of missing values are packed numbers."""
+    values = np.array(packed, float)
+    missing = [m for key in ("_FillValue", "missing_value") for m in _numbers(path, name, key, attributes)]
+    values[np.isin(values, missing)] = np.nan
+    scale = [*_numbers(path, name, "scale_factor", attributes), 1.0][0]
+    if scale == 0.0:
+        raise TerrainError(f"{path.name}: scale_factor = 0 of '{name}' leaves nothing of its values")
+    return values * scale + [*_numbers(path, name, "add_offset", attributes), 0.0][0]
+
+
+def _numbers(path: Path, name: str, key: str, attributes: dict) -> list[float]:
+    """The numbers of an attribute; none where it is absent."""
+    try:
+        return [float(value) for value in np.ravel(attributes.get(key, ()))]
+    except (TypeError, ValueError) as error:
+        raise TerrainError(f"{path.name}: {key} of '{name}' is no number ({briefly(str(error))})") from error
 
 
 def _netcdf_variables(path: Path):

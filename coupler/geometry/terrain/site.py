@@ -24,7 +24,7 @@ from coupler.geometry.terrain.height_map import HeightMap
 
 KEPT = ".terrain"
 """Folder beside the file."""
-FORMAT = 1
+FORMAT = 2
 """Version of the steps below; after a change, rasters kept before are made again."""
 FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
 PLACED = ("origin", "turn", "offset", "land")
