@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from array_types import Array
 from coupler.results.history import Column, write_table
 from coupler.results.maps import NEVER, Maps
@@ -72,8 +74,9 @@ def _around(maps: Maps, watch: Watch, rows: Array) -> tuple[float, float, float,
     """Largest depth, speed, h v² and first arrival at the columns around the blocks of a body."""
     fitted, f = maps.fitted, watch.facts
     X, Y = fitted.column_x, fitted.column_y
-    reach = AROUND * max(X[1] - X[0], Y[1] - Y[0])
-    low, high = f.lower[rows].min(axis=0)[:2] - reach, f.upper[rows].max(axis=0)[:2] + reach
+    low, high = f.lower[rows].min(axis=0)[:2], f.upper[rows].max(axis=0)[:2]
+    reach = AROUND * max(_widest(axis, low[k], high[k]) for k, axis in enumerate((X, Y)))
+    low, high = low - reach, high + reach
     near = ((low[0] <= X) & (high[0] >= X))[:, None] & ((low[1] <= Y) & (high[1] >= Y))
     near = near.ravel()
     arrival = maps.arrival[near][maps.arrival[near] != NEVER]
@@ -82,3 +85,9 @@ def _around(maps: Maps, watch: Watch, rows: Array) -> tuple[float, float, float,
         *(float(getattr(maps, name)[near].max(initial=0.0)) for name in ("depth", "speed", "flux")),
         first,
     )
+
+
+def _widest(axis: Array, low: float, high: float) -> float:
+    """The largest distance of two neighbouring columns [m] between which a part of the range lies."""
+    first, last = np.clip(np.searchsorted(axis, [low, high], side="right") - 1, 0, len(axis) - 2)
+    return float(np.diff(axis)[first : last + 1].max())

@@ -4,7 +4,8 @@ mesh.
     h: wet length of a column · v: mean of its horizontal velocity over h · arrival: h passes FILM where it was dry
 
 Written as ESRI ASCII grids, `maps/depth.asc`, `speed.asc`, `flux.asc` (h v²), `arrival.asc`, `bed.asc`, in the
-coordinates of the terrain file where the tank is not turned against it, else of the tank.
+coordinates of the terrain file where the tank is not turned against it, else of the tank. Such a grid is even: columns
+that are stretched are written on a raster as fine as the finest of them (`even_raster.py`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from array_types import Array
+from coupler.results.even_raster import even_raster
 
 FILM = 0.1
 """Depth in layers of the mesh from which a place counts as wet; the speed of thinner films is not resolved."""
@@ -99,14 +101,17 @@ class Maps:
                 "time of arrival where it was dry [s]",
             ),
         }
-        for name, (values, what) in shown.items():
-            self._write(directory / f"{name}.asc", values, what)
+        x, y, even = even_raster(
+            self.fitted.column_x, self.fitted.column_y, *(values for values, _ in shown.values())
+        )
+        for (name, (_, what)), values in zip(shown.items(), even):
+            self._write(directory / f"{name}.asc", x, y, values, what)
 
     def _grid(self, name: str) -> Array:
         return getattr(self, name).reshape(self._shape)
 
-    def _write(self, path: Path, z: Array, what: str) -> None:
-        x, y = self.fitted.column_x, self.fitted.column_y
+    def _write(self, path: Path, x: Array, y: Array, z: Array, what: str) -> None:
+        """Write one map, z (nx, ny) at evenly spaced x (nx,) and y (ny,) [m]."""
         frame = "the tank"
         x0, y0 = x[0], y[0]
         if self.ground.turn == 0.0:

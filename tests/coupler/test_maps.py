@@ -11,6 +11,7 @@ from coupler.commands.export.netcdf import write_netcdf
 from coupler.commands.view.flood_map import in_tank
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
+from coupler.results.even_raster import even_raster
 from coupler.results.maps import NEVER, Maps, read_map
 from coupler.scene.build_water import water_of
 
@@ -96,6 +97,67 @@ def test_what_was_gathered_goes_into_checkpoints_and_files(flood, tmp_path):
     grid = read_grid(tmp_path / "maps" / "bed.asc")
     np.testing.assert_allclose(grid.x, 500.0 + maps.fitted.column_x)
     np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-3, atol=1e-4)
+
+
+@pytest.fixture
+def stretched(tmp_path):
+    """The flood on columns that are twice as far apart along the first half of the tank."""
+    rows = [f"{500 + x},{700 + y},{0.2 * (x - 10)}" for x in range(21) for y in range(9)]
+    (tmp_path / "ground.csv").write_text("x,y,z\n" + "\n".join(rows) + "\n")
+    stretch = '[[tank.stretch]]\nalong = "x"\nupper = 10\ncell = 2\n'
+    (tmp_path / "case.toml").write_text(CASE.replace("[terrain]", f"{stretch}[terrain]"))
+    case = load(tmp_path).case
+    water, _ = water_of(case, None, [])
+    return water, Maps(water, fitted_of(case.tank), case.tank.ground)
+
+
+def test_maps_of_stretched_columns_have_their_places(stretched, tmp_path):
+    """A plane bed and level water are linear in x, so each point of the map has the value of its own place."""
+    water, maps = stretched
+    maps.step(water, 0.75)
+    spacing = np.diff(maps.fitted.column_x)
+    assert spacing.max() > 1.7 * spacing.min()
+    maps.write(tmp_path / "maps")
+    bed, depth = (read_grid(tmp_path / "maps" / f"{name}.asc") for name in ("bed", "depth"))
+    assert (bed.x[0], bed.x[-1]) == pytest.approx((500.0, 520.0))
+    assert np.diff(bed.x).max() <= spacing.min() * (1.0 + 1e-6)
+    np.testing.assert_allclose(bed.y, np.linspace(700.0, 708.0, 9))
+    np.testing.assert_allclose(bed.z, np.tile(0.2 * (bed.x - 510.0), (9, 1)).T, rtol=1e-3, atol=1e-3)
+    deep = bed.z < -0.7
+    np.testing.assert_allclose(depth.z[deep], 0.3 - bed.z[deep], rtol=2e-3)
+    assert not np.isfinite(depth.z[bed.x > 513.0]).any()
+
+
+def test_values_end_half_way_to_a_column_without_one():
+    z = np.array([[1.0, 1.0], [3.0, 3.0], [np.nan, np.nan]])
+    x, y, (even,) = even_raster(np.array([0.0, 4.0, 5.0]), np.arange(2.0), z)
+    np.testing.assert_allclose(x, np.arange(6.0))
+    np.testing.assert_allclose(even[:, 0], [1.0, 1.5, 2.0, 2.5, 3.0, np.nan])
+    x, _, (even,) = even_raster(np.array([0.0, 1.0, 5.0]), np.arange(2.0), z)
+    np.testing.assert_allclose(even[:, 1], [1.0, 3.0, 3.0, np.nan, np.nan, np.nan])
+    assert y.tolist() == [0.0, 1.0]
+
+
+def test_maps_stay_small_where_a_few_columns_are_very_fine(monkeypatch):
+    monkeypatch.setattr("coupler.results.even_raster.MOST_POINTS", 1000)
+    fine = np.concatenate([np.arange(0.0, 100.0, 10.0), np.arange(100.0, 101.0, 0.1)])
+    x, y, _ = even_raster(fine, np.arange(10.0))
+    assert len(x) * len(y) <= 1010
+    assert (x[0], x[-1]) == (fine[0], fine[-1])
+
+
+def test_the_flood_around_a_building_comes_from_the_columns_beside_it(stretched):
+    """Near the far end columns are a metre apart, and what lies 1.6 m away is not beside the building."""
+    from types import SimpleNamespace
+
+    from coupler.results.buildings_table import _around
+
+    _, maps = stretched
+    facts = SimpleNamespace(lower=np.array([[16.0, 3.0, 0.0]]), upper=np.array([[18.0, 5.0, 2.0]]))
+    X, Y = maps.fitted.column_x, maps.fitted.column_y
+    maps.depth[:] = np.broadcast_to(np.where(X < 14.4, 9.0, 1.0)[:, None], (len(X), len(Y))).ravel()
+    depth, *_ = _around(maps, SimpleNamespace(facts=facts), np.array([0]))
+    assert depth == 1.0
 
 
 def test_maps_as_netcdf_hold_their_place_units_and_holes(flood, tmp_path):
