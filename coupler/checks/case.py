@@ -24,9 +24,10 @@ from coupler.checks.places import frame_problems, opening_problems, place_proble
 from coupler.checks.softness import softness_remarks
 from coupler.checks.tables import table_problems
 from coupler.checks.water import water_problems, water_remarks
+from coupler.geometry.cell_sizes import has_equal_cells, places_in, widest_cell
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
-from coupler.geometry.tank_mesh import finest_cell, is_measured, mesh_remarks
+from coupler.geometry.tank_mesh import is_measured, mesh_remarks
 from coupler.geometry.terrain.land import land_problems
 from coupler.geometry.town import town_problems, town_remarks
 from coupler.program.errors import did_you_mean
@@ -95,15 +96,16 @@ def thin_remarks(case: Case) -> Iterator[str]:
     places gave up to 0.15 more. On a wall of 1.9 cells it exerted all of it."""
     if case.tank is None or case.water is None or case.water.covers != "single":
         return
-    cell = finest_cell(case.tank)
-    widest = {True: 2.0 * cell * (1.0 - 1e-9), False: cell}
-    thin = [(name, width) for name, width, divides in _widths(case) if width < widest[divides]]
+    thin: dict[str, tuple[float, float, float]] = {}
+    for name, width, cell, divides in _widths(case):
+        if width < (2.0 * (1.0 - 1e-9) if divides else 1.0) * cell:
+            thin[name] = min(thin.get(name, (np.inf, 0.0, 0.0)), (width / cell, width, cell))
     if thin:
-        name, width = min(thin, key=lambda item: item[1])
+        name, (_, width, cell) = min(thin.items(), key=lambda item: item[1])
         below, lost = "a cell", "most of the load can be missing"
         if width >= cell:
             below, lost = "two cells", "nearly half of the load can be missing, and water pass through"
-        more = sum(other < (cell if width < cell else 2.0 * cell) for _, other in thin) - 1
+        more = sum(share < (1.0 if width < cell else 2.0) for share, *_ in thin.values()) - 1
         others = f" (and {more} more are thinner than {below})" if more else ""
         yield (
             f"{name} is {width:g} m thick, thinner than {below} ({cell:.3g} m){others}: with single covers the water "
@@ -112,21 +114,37 @@ def thin_remarks(case: Case) -> Iterator[str]:
         )
 
 
-def _widths(case: Case) -> Iterator[tuple[str, float, bool]]:
-    """Name and smallest width [m] of solids, walls and floors as wholes, which may have water on one side alone (True),
-    and of all other blocks (False)."""
+def _widths(case: Case) -> Iterator[tuple[str, float, float, bool]]:
+    """Name, smallest width [m] and largest size [m] of the cells across it, of solids, walls and floors as wholes,
+    which may have water on one side alone (True), and of all other blocks (False)."""
     from coupler.geometry.bodies import Body
 
     for _, name, body in solid_bodies(case):
-        yield name, body.thickness(), True
+        yield name, body.thickness(), widest_cell(case.tank, places_in(body), body.thin_way()), True
+    equal = has_equal_cells(case.tank)
     for part in parts_of(case):
         spec = getattr(case.structure, str(part.path[1]))[part.path[2]]
-        if part.path[1] == "wall":
-            yield part.name, min(spec.size), True
-        elif part.path[1] == "building":
-            yield part.name, min(spec.wall_thickness, spec.floor_thickness or np.inf), True
+        if part.path[1] in ("wall", "building"):
+            bodies = [] if equal else [Body.of_block(block) for block in part.blocks]
+            places = [place for body in bodies for place in (*body.vertices, body.vertices.mean(axis=0))]
+            for width, way in _thin_ways(part.path[1], spec):
+                yield part.name, width, widest_cell(case.tank, np.array(places), way), True
         else:
-            yield part.name, min(Body.of_block(b).thickness() for b in part.blocks), False
+            for body in map(Body.of_block, part.blocks):
+                middle = body.vertices.mean(axis=0, keepdims=True)
+                yield part.name, body.thickness(), widest_cell(case.tank, middle, body.thin_way()), False
+
+
+def _thin_ways(kind, spec) -> Iterator[tuple[float, np.ndarray]]:
+    """Widths [m] of a wall, or of the walls and floors of a building, and the unit directions (3,) across them."""
+    c, s = np.cos(spec.turn), np.sin(spec.turn)
+    ways = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    if kind == "wall":
+        yield min(spec.size), ways[int(np.argmin(spec.size))]
+    else:
+        yield spec.wall_thickness, ways[0]
+        yield spec.wall_thickness, ways[1]
+        yield spec.floor_thickness or spec.wall_thickness, ways[2]
 
 
 def _joint_remarks(case: Case) -> Iterator[str]:

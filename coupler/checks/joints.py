@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from coupler.case.case import Case
 from coupler.case.types import Problem
+from coupler.geometry.cell_sizes import cells_at
 from coupler.geometry.parts import Part
-from coupler.geometry.tank_mesh import finest_cell, is_measured
+from coupler.geometry.tank_mesh import is_measured
 from coupler.program.errors import did_you_mean
 
 
@@ -75,18 +78,20 @@ def uplift_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
         for face, law in zip(faces, laws)
         if law is not None and law.uplift != "none" and not both_held(blocks, face)
     ]
-    cell = finest_cell(case.tank)
-    narrow = [
-        (width, face) for face in wet if (width := least_width(face.polygon)) < THINNEST * cell * (1 - 1e-9)
-    ]
-    if narrow:
-        width, face = min(narrow, key=lambda item: item[0])
+    if not wet:
+        return
+    width = np.array([least_width(face.polygon) for face in wet])
+    cell = cells_at(case.tank, np.array([face.polygon.mean(axis=0) for face in wet]))
+    narrow = np.flatnonzero(width < THINNEST * cell * (1 - 1e-9))
+    if len(narrow):
+        row = narrow[(width[narrow] / cell[narrow]).argmin()]
+        face, wide, size = wet[row], width[row], cell[row]
         other = blocks[face.b].name if face.b >= 0 else planes[-1 - face.b].name
         yield (
             ("joints", "uplift"),
-            f"the joint of '{blocks[face.a].name}' with '{other}' is {width:.3g} m wide ({len(narrow)} of {len(wet)} "
-            f"such joints are under {THINNEST:g} cells of {cell:.3g} m): water between so narrow faces would flow as "
-            f"through an opening a cell wide; take cells of {width / THINNEST:.2g} m, or give uplift in a joints.pair "
+            f"the joint of '{blocks[face.a].name}' with '{other}' is {wide:.3g} m wide ({len(narrow)} of {len(wet)} "
+            f"such joints are under {THINNEST:g} cells of {size:.3g} m): water between so narrow faces would flow as "
+            f"through an opening a cell wide; take cells of {wide / THINNEST:.2g} m, or give uplift in a joints.pair "
             'for wide joints alone, and "none" elsewhere',
         )
 

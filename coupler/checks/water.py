@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,12 @@ from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.types import KeyPath, Problem
 from coupler.checks.inflow_volumes import depth_behind, inflow_volume_problems
-from coupler.geometry.tank_mesh import (
-    finest_cell,
-    floor_along,
-    is_measured,
-    mean_bed,
-)
+from coupler.geometry.cell_sizes import edges_at, has_equal_cells, places_in_box, widest_cell
+from coupler.geometry.stretches import axes_of
+from coupler.geometry.tank_mesh import floor_along, is_measured, mean_bed
 from coupler.scene.build_water import SLACK, fills_beside, level_at_start, sea_level
 
+UPWARDS = np.array([0.0, 0.0, 1.0])
 HIGHEST_WAVE = 0.78
 """Height of a solitary wave over the depth beyond which it breaks."""
 
@@ -93,46 +92,69 @@ def thin_water_remarks(case: Case) -> Iterator[str]:
     """Boxes of water, inflows and seas that are thinner than a few cells; walls and other water lengthen a box."""
     if case.tank is None or case.water is None:
         return
-    tank, cell = case.tank, finest_cell(case.tank)
+    tank = case.tank
     found = []
     if tank.is_box:
         for i, fill in enumerate(case.water.fill):
-            found += [(f"water.fill[{i}]", edge) for edge in _free_edges(case, fill)]
+            found += [(f"water.fill[{i}]", *free) for free in _free_edges(case, fill)]
     for kind in ("inflow", "sea"):
         for i, spec in enumerate(getattr(case.water, kind)):
-            found.append(
-                (f"the water at water.{kind}[{i}]", level_at_start(spec) - floor_along(tank, spec.side))
-            )
-    for name, edge in found:
+            edge = level_at_start(spec) - floor_along(tank, spec.side)
+            found.append((f"the water at water.{kind}[{i}]", edge, _cell_along(tank, spec, edge)))
+    for name, edge, cell in found:
         if 0.0 < edge < LEAST_CELLS * cell * (1.0 - SLACK):
             yield (
                 f"{name} is {edge:.3g} m thin, {edge / cell:.2g} cells: under {LEAST_CELLS} cells water is not "
-                f"resolved, volume and energy may be off by more than a run allows; take tank.cell = {edge / 4:.2g} m"
+                f"resolved, volume and energy may be off by more than a run allows; take {_finer(tank, edge / 4)}"
             )
+
+
+def _finer(tank, cell: float) -> str:
+    """What to write for cells of a size [m]: the key of the tank, or that of the parts where they have another size."""
+    return f"tank.cell = {cell:.2g} m" if has_equal_cells(tank) else f"cells of {cell:.2g} m there"
+
+
+def _cell_along(tank, spec, depth: float) -> float:
+    """Largest height [m] of the cells along a side in water of this depth [m]."""
+    axis = "xyz".index(spec.side[0])
+    lower, upper = np.array(tank.lower), np.array(tank.upper)
+    lower[2] = floor_along(tank, spec.side)
+    upper[2] = lower[2] + max(depth, SLACK * tank.cell)
+    if spec.side[1] == "-":
+        upper[axis] = lower[axis] + SLACK * tank.cell
+    else:
+        lower[axis] = upper[axis] - SLACK * tank.cell
+    return widest_cell(tank, places_in_box(lower, upper), UPWARDS)
 
 
 def _drops(case: Case) -> Iterator[Problem]:
     """Boxes of water in the air that are too thin to hold a surface on each of their two sides."""
     for i, fill in enumerate(case.water.fill):
-        edge = min(_free_edges(case, fill, ends=2), default=math.inf)
-        if edge < LEAST_DROP * case.tank.cell * (1.0 - SLACK):
+        free = min(_free_edges(case, fill, ends=2), key=lambda one: one[0] / one[1], default=None)
+        if free is None:
+            continue
+        edge, cell = free
+        if edge < LEAST_DROP * cell * (1.0 - SLACK):
             yield (
                 ("water", "fill", i),
-                f"{edge:.3g} m thin, {edge / case.tank.cell:.2g} cells, with air on both sides: under {LEAST_DROP:g} "
-                f"cells the two surfaces cannot be distinguished; take tank.cell = {edge / 3:.2g} m, or more water",
+                f"{edge:.3g} m thin, {edge / cell:.2g} cells, with air on both sides: under {LEAST_DROP:g} "
+                f"cells the two surfaces cannot be distinguished; take {_finer(case.tank, edge / 3)}, or more water",
             )
 
 
-def _free_edges(case: Case, fill, ends: int = 1) -> Iterator[float]:
+def _free_edges(case: Case, fill, ends: int = 1) -> Iterator[tuple[float, float]]:
     """Edges [m] of a box of water of whose two ends at least `ends` are free, that is neither at a wall nor in other
-    water. A box from wall to wall is a slice, whatever its width; one on the floor is a layer."""
+    water, each with the largest size [m] of the cells along it. A box from wall to wall is a slice, whatever its
+    width; one on the floor is a layer."""
     slack = SLACK * case.tank.cell
     for axis in range(3):
         low, high = fill.lower[axis], fill.upper[axis]
         at_wall = low <= case.tank.lower[axis] + slack, high >= case.tank.upper[axis] - slack
         others = [f for f in case.water.fill if f is not fill and _meet(f, fill, slack)]
         if sum(at_wall) <= 2 - ends and not others:
-            yield high - low
+            lower = np.maximum(fill.lower, case.tank.lower)
+            places = places_in_box(lower, np.maximum(np.minimum(fill.upper, case.tank.upper), lower))
+            yield high - low, widest_cell(case.tank, places, np.eye(3)[axis])
 
 
 def _meet(other, fill, slack: float) -> bool:
@@ -240,7 +262,7 @@ def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
     """A side that absorbs reads the water a cell inside, and a sea pushes water into dry cells beside it: the side
     opposite to them must not be the next but one."""
     axis = "xyz".index(spec.side[0])
-    cells = round((tank.upper[axis] - tank.lower[axis]) / finest_cell(tank))
+    cells = _cells_across(tank, axis)
     if cells >= LEAST_ACROSS:
         return
     where = f"the side opposite to {spec.side} is only {cells} cells away"
@@ -250,6 +272,21 @@ def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
         yield (*path, "absorbs"), f"true, but {where}: {reads}, and {wider}, or no absorbs"
     else:
         yield (*path, "side"), f"{where}: the water of a sea would reach it at once, and {wider}"
+
+
+def _cells_across(tank, axis: int) -> int:
+    """The least number of cells from one side of a box to the opposite one."""
+    if has_equal_cells(tank):
+        return round((tank.upper[axis] - tank.lower[axis]) / tank.cell)
+    walls = axes_of(tank)[axis]
+    if len(walls) > LEAST_ACROSS:  # halved ones are more
+        return len(walls) - 1
+    count = 0.0
+    for low, high in pairwise(walls):
+        lower, upper = np.array(tank.lower), np.array(tank.upper)
+        lower[axis], upper[axis] = low, high
+        count += (high - low) / edges_at(tank, places_in_box(lower, upper))[:, axis].max()
+    return round(count)
 
 
 def _stands_beside(case: Case, sea) -> bool:

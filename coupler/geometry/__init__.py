@@ -2,6 +2,7 @@
 
 tank_mesh, tetrahedra             the mesh of the water
 tank_regions, stretches           regions of finer cells; bricks stretched along an axis
+cell_sizes                        the size of the cells at a place
 basin                             a basin from a mesh file as blocks meet it
 terrain                           the ground of a site, from files
 start_surfaces                    surfaces of the water at the start that are not level

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from coupler.case.case import Case
-from coupler.checks.case import problems, remarks
+from coupler.checks.case import problems, remarks, thin_remarks
 from coupler.geometry.bodies import Body, overlap_depth, rotation_matrix
+from coupler.geometry.tank_mesh import measured
 from yade_scripts.blocks.block import Block
 
 SPACE = st.floats(-3.0, 3.0)
@@ -322,6 +323,76 @@ def test_walls_thinner_than_a_cell_are_remarked():
     ]
     assert found[0].startswith("w is 1.4 m thick, thinner than two cells (1 m): with single covers")
     assert "water pass through" in found[0]
+
+
+QUAY = {"name": "quay", "centre": [30.3, 4, 3], "size": [1.2, 8, 6]}
+FINE_BOX = {"refine": [{"lower": [0, 0, 0], "upper": [3, 8, 2], "levels": 2}]}
+
+
+def long_tank(solid, **tank):
+    """A tank of 40 x 8 x 8 m, measured, with cells of 1 m unless `tank` says otherwise."""
+    content = case(
+        tank={"lower": [0, 0, 0], "upper": [40, 8, 8], "cell": 1, **tank},
+        water={"fill": [{"lower": [0, 0, 0], "upper": [10, 8, 4]}]},
+        solid=[solid],
+    )
+    found, wrong = measured(content)
+    assert wrong == []
+    return found
+
+
+@pytest.mark.parametrize(
+    ("solid", "tank", "says"),
+    [
+        (QUAY, {}, "quay is 1.2 m thick, thinner than two cells (1 m)"),
+        (QUAY, FINE_BOX, "quay is 1.2 m thick, thinner than two cells (1 m)"),
+        (
+            QUAY | {"size": [2.5, 8, 6]},
+            {"stretch": [{"along": "x", "lower": 20, "cell": 4}]},
+            "quay is 2.5 m thick, thinner than a cell (4 m)",
+        ),
+        (QUAY, {"stretch": [{"along": "y", "cell": 2}]}, "quay is 1.2 m thick, thinner than two cells (1 m)"),
+        (QUAY, {"refine": [{"around": ["quay"], "levels": 1}]}, ""),
+        (
+            {"name": "mole", "centre": [20, 4, 1], "size": [36, 1.2, 2]},
+            FINE_BOX,
+            "mole is 1.2 m thick, thinner than two cells (1 m)",
+        ),
+    ],
+)
+def test_walls_are_thin_by_the_cells_that_they_stand_in(solid, tank, says):
+    """Finer cells elsewhere make no wall thicker; coarser ones across it make it thinner, along it they do not."""
+    found = [text for text in thin_remarks(long_tank(solid, **tank))]
+    assert [text[: len(says)] for text in found] == ([says] if says else [])
+
+
+def test_blocks_walls_and_buildings_are_thin_by_the_cells_that_they_stand_in():
+    parts = {
+        "block": [{"name": "slab", "centre": [30, 4, 0.25], "size": [2, 2, 0.5]}],
+        "wall": [{"name": "w", "lower": [20, 0, 0], "size": [1.5, 4, 2], "block": [1.5, 2, 1]}],
+        "building": [
+            {"name": "h", "lower": [10, 0, 0], "size": [6, 6, 4], "wall_thickness": 1.2, "block": [1, 1]}
+        ],
+    }
+    for kind, tables in parts.items():
+        made = case(
+            tank={"lower": [0, 0, 0], "upper": [40, 8, 8], "cell": 1, **FINE_BOX},
+            structure={kind: tables},
+            contact={"stiffness": 1e6},
+        )
+        (found,) = thin_remarks(measured(made)[0])
+        assert found.startswith(f"{tables[0]['name']} is "), found
+
+
+def test_joints_that_let_water_in_are_measured_by_the_cells_around_them():
+    row = structure(*({"size": [2, 2, 1.5], "centre": [5 + 2 * i, 5, 0.75]} for i in range(2)))
+    wet = {"strength": 1e5, "opening_at_failure": 1e-3, "uplift": "full"}
+    tank = {"lower": [0, 0, 0], "upper": [10, 10, 10], "cell": 1}
+    far = {"refine": [{"lower": [0, 0, 7], "upper": [2, 2, 9]}]}
+    near = {"refine": [{"lower": [3, 3, 0], "upper": [9, 7, 3]}]}
+    (found,) = reported(measured(case(**row, joints=wet, tank=tank | far))[0])
+    assert "the joint of 'b0' with 'b1' is 1.5 m wide (1 of 3 such joints are under 2 cells of 1 m)" in found
+    assert reported(measured(case(**row, joints=wet, tank=tank | near))[0]) == []
 
 
 def test_a_single_pass_with_blocks_lighter_than_the_water_is_remarked():

@@ -313,6 +313,43 @@ def test_a_layer_on_other_water_is_not_thin():
     assert "water at water.sea[0] is 0.1 m thin" in remarks(case({"sea": [{"side": "x+", "level": 0.1}]}))[0]
 
 
+def in_parts(water, **tank):
+    found, wrong = measured(case(water, tank=TANK | tank))
+    assert wrong == []
+    return found
+
+
+HIGH_UP = {"lower": [1.2, 0, 0.6], "upper": [2, 0.2, 1.0], "levels": 2}
+
+
+def test_water_is_measured_by_the_cells_that_it_is_in():
+    """Finer cells elsewhere resolve neither a layer nor the water at a side; finer cells around it do."""
+    layer = {"fill": [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.25]}]}
+    assert "0.25 m thin, 2.5 cells" in remarks(in_parts(layer, refine=[HIGH_UP]))[0]
+    flat = HIGH_UP | {"lower": [0, 0, 0], "upper": [2, 0.2, 0.3]}
+    assert remarks(in_parts(layer, refine=[flat])) == []
+    sea = {"sea": [{"side": "x+", "level": 0.1}]}
+    (found,) = [text for text in remarks(in_parts(sea, refine=[HIGH_UP])) if "thin" in text]
+    assert "water.sea[0] is 0.1 m thin, 1 cells" in found
+    assert "take cells of 0.025 m there" in found
+    assert not [text for text in remarks(in_parts(sea, refine=[flat])) if "thin" in text]
+
+
+def test_a_drop_is_measured_by_the_cells_that_it_is_in():
+    drop = {"fill": [{"lower": [0.5, 0, 0.5], "upper": [1.0, 0.2, 0.7]}]}
+    around = {"lower": [0.3, 0, 0.3], "upper": [1.2, 0.2, 0.9]}
+    for region, wrong in ((HIGH_UP, True), (around, False)):
+        found = problems(in_parts(drop, refine=[region]))
+        assert any("with air on both sides" in text for _, text in found) == wrong
+
+
+def test_cells_between_opposite_sides_are_counted_beside_a_finer_part():
+    sea = {"sea": [{"side": "y+", "level": 0.5, "absorbs": True}]}
+    for region, wrong in ((HIGH_UP, True), (HIGH_UP | {"lower": [0, 0, 0]}, False)):
+        found = problems(in_parts(sea, refine=[region]))
+        assert any("side opposite to y+ is only 2 cells away" in text for _, text in found) == wrong
+
+
 def test_the_split_of_a_case_is_that_of_its_mesh():
     """Mirrored bricks: nodes in which diagonals end hold three times the water of the others, away from the walls."""
     cube = {"lower": [0, 0, 0], "upper": [1, 1, 1], "cell": 0.25}
