@@ -4,7 +4,8 @@
 what = "..."           for people                    table, column   of the history
 take = "last"          last | largest (by size, sign kept) | max | min | mean | at (time) | integral (from, to) |
                        period | arrival (above): first time that the column exceeds a value
-from, to               of that part of the history alone, whatever is taken
+from, to               of that part of the history alone, whatever is taken; there is no value where the run has not
+                       recorded all of it, but for a row at its ends, nor at a time outside of what it recorded
 value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
 source = "..."         where the number comes from
 """
@@ -61,11 +62,11 @@ def taken(entry: dict, run: Path) -> tuple[float, str]:
     if reason:
         return float("nan"), reason
     time, values = columns["time"], columns[entry["column"]]
+    reason = _beyond(time, entry)
+    if reason:
+        return float("nan"), reason
     if "from" in entry:
-        start, end = max(entry["from"], time[0]), min(entry["to"], time[-1])
-        if not start < end:
-            return float("nan"), f"the run has nothing from {entry['from']:g} to {entry['to']:g} s"
-        time, values = _window(time, values, start, end)
+        time, values = _window(time, values, *_recorded(time, entry))
     return float(TAKE[entry["take"]](time, values, entry)), ""
 
 
@@ -80,6 +81,29 @@ def _columns(entry: dict, run: Path) -> tuple[dict, str]:
     return columns, "" if len(columns["time"]) else f"{table} has no rows"
 
 
+def _beyond(time: Array, entry: dict) -> str:
+    """Why an entry is about times of which a history (n,) [s] has no rows; empty if it has them all. The first row is
+    that after the first step of the run, and the last one may lie an interval inside."""
+    slack = float(np.diff(time).max(initial=0.0))
+    low, high = min(0.0, time[0] - slack), time[-1] + slack
+    if "from" in entry:
+        start, end = _recorded(time, entry)
+        if not start < end:
+            return f"the run has nothing from {entry['from']:g} to {entry['to']:g} s"
+        if entry["from"] < low:
+            return f"the run has nothing from {entry['from']:g} to {start:g} s"
+        if entry["to"] > high:
+            return f"the run has nothing from {end:g} to {entry['to']:g} s"
+    if entry["take"] == "at" and not low <= entry["time"] <= high:
+        return f"the run has nothing at {entry['time']:g} s, only from {time[0]:g} to {time[-1]:g} s"
+    return ""
+
+
+def _recorded(time: Array, entry: dict) -> tuple[float, float]:
+    """Begin and end [s] of the part of a window that a history has."""
+    return max(entry["from"], time[0]), min(entry["to"], time[-1])
+
+
 def _window(time: Array, values: Array, start: float, end: float) -> tuple[Array, Array]:
     """The part of a history from start to end [s], with its values there."""
     grid = np.unique(np.concatenate([[start, end], time]))
@@ -88,7 +112,7 @@ def _window(time: Array, values: Array, start: float, end: float) -> tuple[Array
 
 
 def _integral(time: Array, values: Array, entry: dict) -> float:
-    grid, part = _window(time, values, entry["from"], entry["to"])
+    grid, part = _window(time, values, *_recorded(time, entry))
     return np.trapezoid(part, grid)
 
 

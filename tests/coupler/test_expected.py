@@ -76,6 +76,49 @@ def test_a_promise_about_what_the_run_has_not_is_not_kept(tmp_path, right, wrong
     assert str(verdict) == f"x: {reported}, expected 0 to inf"
 
 
+FIVE = '[[expect]]\nwhat = "x"\ntable = "history/b.csv"\ncolumn = "f"\nat_least = 0\n'
+
+
+def constant(folder, entry):
+    """The verdict on a force of 5 N that a run of one second recorded every 0.1 s, from its first step on."""
+    (folder / "history").mkdir(parents=True)
+    table = HistoryTable(folder / "history" / "b.csv", (("time", "s", "time"), ("f", "N", "a force")))
+    for k in range(1, 11):
+        table.append(time=0.1 * k, f=5.0)
+    table.close()
+    (folder / "expected.toml").write_text(FIVE + entry, encoding="utf-8")
+    (verdict,) = verdicts(folder, folder / "expected.toml")
+    return verdict
+
+
+@pytest.mark.parametrize("take", ["integral", "mean", "max", "last", "period"])
+@pytest.mark.parametrize(
+    ("window", "missing"),
+    [
+        ("from = 0.5\nto = 3", "from 1 to 3 s"),
+        ("from = -1\nto = 0.5", "from -1 to 0.1 s"),
+        ("from = 2\nto = 3", "from 2 to 3 s"),
+        ("from = -2\nto = 3", "from -2 to 0.1 s"),
+    ],
+)
+def test_a_window_that_the_run_has_not_is_neither_extended_nor_shortened(tmp_path, take, window, missing):
+    verdict = constant(tmp_path, f'take = "{take}"\n{window}\n')
+    assert not verdict.kept
+    assert verdict.reason == f"the run has nothing {missing}"
+
+
+def test_a_window_may_begin_before_the_first_row_by_an_interval(tmp_path):
+    """A history has no row at the start; what is integrated is what was recorded, 0.4 s and then 0.5 s of it."""
+    assert constant(tmp_path / "0", 'take = "integral"\nfrom = 0\nto = 0.5\n').found == pytest.approx(2.0)
+    assert constant(tmp_path / "1", 'take = "integral"\nfrom = 0.5\nto = 1.05\n').found == pytest.approx(2.5)
+
+
+def test_a_value_at_a_time_after_the_end_is_none(tmp_path):
+    assert constant(tmp_path / "0", 'take = "at"\ntime = 1.05\n').found == 5.0
+    late = constant(tmp_path / "1", 'take = "at"\ntime = 1.5\n')
+    assert late.reason == "the run has nothing at 1.5 s, only from 0.1 to 1 s"
+
+
 @pytest.mark.parametrize(
     ("text", "reported"),
     [
