@@ -54,9 +54,13 @@ class Terrain(Section):
         examples=["EPSG:32654"],
     )
     scale: PositiveLength = Field(
-        1.0, description="length of one unit of the file along x and y", examples=["1 ft"]
+        1.0,
+        description="length of one unit of the file along x and y; not with reproject, which makes metres",
+        examples=["1 ft"],
     )
-    height_scale: PositiveLength | None = Field(None, description="the same for its heights; absent: scale")
+    height_scale: PositiveLength | None = Field(
+        None, description="the same for its heights; absent: scale (with reproject: metres)"
+    )
     positive: Literal["up", "down"] = Field("up", description="down: the file holds depths")
     zero: Length = Field(
         0.0,

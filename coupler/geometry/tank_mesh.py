@@ -351,9 +351,12 @@ def _on_terrain(case: Case) -> tuple[Case, list[Problem]]:
     """The case with its tank over its terrain, and why that cannot be."""
     from coupler.geometry.terrain.checks import terrain_problems
     from coupler.geometry.terrain.grid import TerrainError
-    from coupler.geometry.terrain.site import terrain_of
+    from coupler.geometry.terrain.site import scaled_twice, terrain_of
     from fluid.mesh.background import MeshError
 
+    twice = scaled_twice(case.terrain)
+    if twice:
+        return case, [(("terrain", "scale"), twice)]
     try:
         ground = terrain_of(case.terrain)
     except TerrainError as error:

@@ -9,7 +9,7 @@ from coupler.case.terrain import Terrain
 from coupler.checks.read_case import load
 from coupler.geometry.tank_mesh import bed_along, mean_bed, mesh_remarks
 from coupler.geometry.terrain.bed_mesh import fitted_of
-from coupler.geometry.terrain.grid import TerrainError
+from coupler.geometry.terrain.grid import Grid, TerrainError
 from coupler.geometry.terrain.grids import read_grid
 from coupler.geometry.terrain.height_map import HeightMap
 from coupler.geometry.terrain.land import friction_of
@@ -251,6 +251,27 @@ def test_feet_and_degrees_are_refused_until_they_are_said(tmp_path):
     (tmp_path / "g.prj").write_text('GEOGCS["WGS 84"]')
     with pytest.raises(TerrainError, match=r"degrees.*reproject.*EPSG:32"):
         terrain_of(Terrain(path=str(tmp_path / "g.asc"), smooth=1.0))
+
+
+def test_a_site_is_not_scaled_again_after_it_was_reprojected(tmp_path, monkeypatch):
+    """A change of the coordinate system makes metres; heights in feet have a key of their own."""
+
+    def in_metres(name, grid, source, target):
+        return Grid(0.3048 * grid.x, 0.3048 * grid.y, grid.z, target)
+
+    monkeypatch.setattr("coupler.geometry.terrain.raster.reprojected", in_metres)
+    write_esri(tmp_path / "g.asc")
+    (tmp_path / "g.prj").write_text('PROJCS["x",GEOGCS["y"],UNIT["US survey foot",0.3048006096]]')
+    spec = {"path": str(tmp_path / "g.asc"), "reproject": "EPSG:32654"}
+    with pytest.raises(TerrainError, match=r"g.asc: terrain.scale: 0.3048 m beside reproject.*height_scale"):
+        terrain_of(Terrain(**spec, scale="1 ft"))
+    found = terrain_of(Terrain(**spec, height_scale="1 ft"))
+    assert np.ptp(found.x) == pytest.approx(20 * 0.3048)
+    np.testing.assert_allclose(found.z, 0.3048 * Z, atol=1e-6)
+    with pytest.raises(BadCase) as error:
+        made(tmp_path, "terrain.scale=1 ft", "terrain.reproject=EPSG:32654")
+    (line,) = error.value.lines
+    assert "terrain.scale: 0.3048 m beside reproject = 'EPSG:32654'" in line
 
 
 CASE = """

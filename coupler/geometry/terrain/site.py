@@ -33,8 +33,21 @@ PLACED = ("origin", "turn", "offset", "land")
 
 def terrain_of(spec) -> HeightMap:
     """The height map of a section [terrain]; read once unless the file changes. Raises TerrainError."""
+    twice = scaled_twice(spec)
+    if twice:
+        raise TerrainError(f"{Path(spec.path).name}: terrain.scale: {twice}")
     there = os.stat(spec.path) if Path(spec.path).is_file() else None
     return _placed(spec, there and (there.st_mtime_ns, there.st_size))
+
+
+def scaled_twice(spec) -> str:
+    """Why the unit of a section [terrain] cannot be, beside a change of its coordinate system; empty if it can."""
+    if spec.reproject is None or spec.scale == 1.0:
+        return ""
+    return (
+        f"{spec.scale:g} m beside reproject = '{spec.reproject}', whose x and y are metres already, so that the site "
+        "would change its size; leave scale out, and write height_scale where heights have another unit"
+    )
 
 
 @lru_cache(maxsize=2)
@@ -96,7 +109,7 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
         grid = reprojected(name, grid, crs, spec.reproject)
     else:
         _refuse_degrees(name, grid, crs, spec)
-    unit, height_unit = spec.scale, spec.height_scale or spec.scale
+    unit, height_unit = spec.scale, spec.height_scale or spec.scale  # after reproject scale is 1
     if FEET.search(crs) and spec.scale == 1.0 and spec.reproject is None:
         raise TerrainError(
             f"{name}: its coordinate system counts in feet ({FEET.search(crs)[0][5:].strip(chr(34))}); write scale = "
