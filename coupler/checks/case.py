@@ -31,7 +31,7 @@ from coupler.geometry.tank_mesh import is_measured, mesh_remarks
 from coupler.geometry.terrain.land import land_problems
 from coupler.geometry.town import town_problems, town_remarks
 from coupler.program.errors import did_you_mean
-from coupler.verdict.divisions import member, storey
+from coupler.verdict.divisions import Divisions
 
 LIGHTEST, HEAVIEST = 5.0, 25e3
 """Densities [kg/m3] between which solids lie: foam and platinum."""
@@ -408,8 +408,8 @@ def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
     moving, solids = list(dict.fromkeys([*several, *blocks])), [solid.name for solid in case.solid]
     unmade = {r.name for r in recipes(case)} - {part.name for part in parts}
 
-    walls = list(dict.fromkeys([*moving, *(member(name) for name in blocks)]))
-    walls += [name for name in dict.fromkeys(storey(wall) for wall in walls) if name]
+    divided = Divisions.of(parts, len(blocks))
+    walls = list(dict.fromkeys([*moving, *divided.members.names, *divided.storeys.names]))
 
     def absent(name: str, known: list[str]) -> bool:
         return name not in known and not any(name == n or name.startswith(f"{n}-") for n in unmade)

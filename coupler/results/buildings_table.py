@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from array_types import Array
@@ -54,20 +56,24 @@ def _row(body: dict, members: list[dict], watch: Watch, maps: Maps) -> tuple:
     largest, first = body["largest"], body["first_break"]
     force, moment = largest["force"] or {}, largest["moment"] or {}
     flood = _around(maps, watch, watch.divisions.bodies.rows(k))
+    walls = _walls(body["name"], members, watch.divisions.members_of(k))
     nan = float("nan")
     return (
         body["name"], *watch.foot[k].tolist(), body["state"], body["joints"], body["joints_broken"],
-        body["area_broken"], body["weight_moved"], first["time"] if first else nan, _walls(body["name"], members),
+        body["area_broken"], body["weight_moved"], first["time"] if first else nan, walls,
         force.get("value", 0.0), force.get("time", nan), *watch.impulse[k, :2].tolist(), moment.get("value", 0.0),
         moment.get("time", nan), *flood,
     )  # fmt: skip
 
 
-def _walls(body: str, members: list[dict]) -> str:
-    """Members of the body that broke, in the order of their first breaks."""
-    own = [m for m in members if m["name"].startswith(f"{body}-") and m["joints_broken"]]
-    own.sort(key=lambda m: m["first_break"]["time"])
-    return " ".join(f"{m['name'][len(body) + 1 :]} {m['joints_broken']}/{m['joints']}" for m in own)
+def _walls(body: str, members: list[dict], own: Collection[str]) -> str:
+    """The members of a body, by their names, that broke, in the order of their first breaks; a wall or column that is a
+    body itself has none."""
+    broken = [m for m in members if m["name"] in own and m["name"] != body and m["joints_broken"]]
+    broken.sort(key=lambda m: m["first_break"]["time"])
+    return " ".join(
+        f"{m['name'].removeprefix(f'{body}-')} {m['joints_broken']}/{m['joints']}" for m in broken
+    )
 
 
 def _around(maps: Maps, watch: Watch, rows: Array) -> tuple[float, float, float, float]:

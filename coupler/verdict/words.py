@@ -39,7 +39,7 @@ def unreached(reported: dict, time: float) -> str | None:
 
 def name_of(reported: dict, name: str) -> str:
     """A wall, floor or storey in words."""
-    return in_words(name, len(reported["bodies"]) < 2)
+    return in_words(name, {body["name"] for body in reported["bodies"]})
 
 
 def point(place: Sequence[float]) -> str:

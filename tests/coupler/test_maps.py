@@ -199,6 +199,7 @@ def test_row_of_a_building_has_the_flood_around_it_and_its_walls_in_the_order_of
     assert depth == maps.depth.reshape(near.shape)[near].max()
     assert (speed, arrival) == (pytest.approx(2.0), 0.75)
     assert flux == pytest.approx(4.0 * depth)
-    broken = [("h-wall0x-", 2, 3.0), ("h-roof0", 1, 1.5), ("h-wall0y+", 0, 9.0), ("hut-wall0x-", 5, 0.1)]
+    broken = [("h-wall0x-", 2, 3.0), ("h-roof0", 1, 1.5), ("h-wall0y+", 0, 9.0), ("h-annex-wall0x-", 5, 0.1)]
     members = [{"name": n, "joints": 7, "joints_broken": k, "first_break": {"time": t}} for n, k, t in broken]
-    assert _walls("h", members) == "roof0 1/7 wall0x- 2/7"
+    assert _walls("h", members, ("h-wall0x-", "h-roof0", "h-wall0y+")) == "roof0 1/7 wall0x- 2/7"
+    assert _walls("pier", [members[0] | {"name": "pier"}], ("pier",)) == ""

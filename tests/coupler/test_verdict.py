@@ -23,12 +23,40 @@ G = 9.81
 
 
 def test_the_name_of_a_block_says_wall_and_storey():
-    assert member("house-wall1x--3-0-1") == "house-wall1x-"
-    assert member("pier-12") == "pier"
-    assert storey("house-wall1x-") == storey("house-roof1") == "house-storey1"
-    assert storey("pier") is None
-    assert in_words("house-wall1x-") == "wall x- of storey 2"
-    assert in_words("house-roof1", one_body=False) == "roof of storey 2 (house)"
+    assert member("house-wall1x--3-0-1", "house") == "house-wall1x-"
+    assert member("pier-12", "pier") == "pier"
+    assert storey("house-wall1x-", "house") == storey("house-roof1", "house") == "house-storey1"
+    assert storey("pier", "pier") is None
+    assert in_words("house-wall1x-", {"house"}) == "wall x- of storey 2"
+    assert in_words("house-roof1", {"house", "hut"}) == "roof of storey 2 (house)"
+    assert in_words("house-storey0", {"house"}) == "the ground storey"
+
+
+def test_names_of_tables_are_no_walls_blocks_or_storeys():
+    """Walls that are called as those of a house, or as its blocks, stay what the case calls them."""
+
+    def part(kind, name, *blocks, group=None):
+        made = tuple(SimpleNamespace(name=block, group=group or name) for block in blocks)
+        return SimpleNamespace(path=("structure", kind, 0), name=name, blocks=made)
+
+    parts = [
+        part("wall", "east-wall2", "east-wall2-0-0-0", "east-wall2-1-0-0"),
+        part("wall", "pier-4", "pier-4-0-0-0"),
+        part("building", "east", "east-wall2x--0-0-0", "east-roof2-0-0-0", group="wall"),
+        part("building", "east-annex", "east-annex-wall0y+-0-0-0", group="wall"),
+        part("block", "quay-pier3", "quay-pier3"),
+    ]
+    found = Divisions.of(parts, 7)
+    assert found.bodies.names == ("east-wall2", "pier-4", "east", "east-annex", "quay-pier3")
+    walls = ("east-wall2x-", "east-roof2", "east-annex-wall0y+")
+    assert found.members.names == ("east-wall2", "pier-4", *walls, "quay-pier3")
+    assert found.storeys.names == ("east-storey2", "east-annex-storey0")
+    assert [found.members_of(k) for k in range(4)] == [("east-wall2",), ("pier-4",), walls[:2], walls[2:]]
+    reported = [in_words(name, found.bodies.names) for name in found.members.names]
+    assert reported == [
+        "east-wall2", "pier-4", "wall x- of storey 3 (east)", "roof of storey 3 (east)",
+        "wall y+ of the ground storey (east-annex)", "quay-pier3",
+    ]  # fmt: skip
 
 
 class FakeJoints:

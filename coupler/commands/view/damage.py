@@ -100,8 +100,8 @@ def shown_parts(found):
 
 def words(found):
     """How parts are named on the figures."""
-    one = len(set(found.blocks["body"])) < 2
-    return lambda name: in_words(name, one)
+    bodies = set(found.blocks["body"])
+    return lambda name: in_words(name, bodies)
 
 
 def save(drawing, stem):
