@@ -235,3 +235,27 @@ def test_a_joint_has_the_same_defaults_in_a_case_and_in_a_script():
 
     of_scripts = {f.name: f.default for f in fields(JointParameters) if f.default is not MISSING}
     assert of_scripts == {name: Joints.model_fields[name].default for name in of_scripts}
+
+
+@pytest.mark.parametrize(
+    "key", ["restitution", "friction", "shear_ratio", "tangential_restitution", "uplift_share"]
+)
+def test_a_contact_has_the_same_limits_in_a_case_and_in_the_law(key):
+    """What the check of a case lets through must not be refused by the run that follows."""
+    from pydantic import ValidationError
+
+    from coupler.case.case import Contact
+    from yade_scripts.contact.law import ContactError, ContactLaw
+
+    def allowed(make, error):
+        try:
+            make()
+        except error:
+            return False
+        return True
+
+    more = {"uplift": "share"} if key == "uplift_share" else {}
+    for value in (-0.1, 0.0, 0.5, 1.0, 1.1, 9.9, 10.0, 10.1):
+        in_case = allowed(lambda value=value: Contact(**{key: value}, **more), ValidationError)
+        in_law = allowed(lambda value=value: ContactLaw(**{key.removesuffix("_share"): value}), ContactError)
+        assert in_case == in_law, (key, value)

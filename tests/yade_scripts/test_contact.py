@@ -195,6 +195,8 @@ def test_a_block_stops_at_a_tank_wall():
         {"friction": -0.1},
         {"nodes_per_edge": 2},
         {"rule": "x"},
+        {"shear_ratio": 0.0},
+        {"shear_ratio": 10.01},
     ],
 )
 def test_impossible_constants_are_refused_by_name(wrong):

@@ -20,6 +20,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 Rule = Literal["exact", "paper"]
+MOST_SHEAR_RATIO = 10.0
+"""Largest K_t/K_n, itself allowed: a round number where no formula has a bound. The longest substep follows from the
+normal stiffness alone."""
 
 
 class ContactError(ValueError):
@@ -69,7 +72,7 @@ class ContactLaw:
         _within("stiffness", self.stiffness if self.stiffness is not None else 1.0, 0.0, np.inf, "N/m")
         _within("restitution", self.restitution, 0.0, 1.0, "-", closed_above=True)
         _within("friction", self.friction, -1e-300, np.inf, "-")
-        _within("shear_ratio", self.shear_ratio, 0.0, 10.0, "-")
+        _within("shear_ratio", self.shear_ratio, 0.0, MOST_SHEAR_RATIO, "-", closed_above=True)
         _within("uplift", self.uplift, -1e-300, 1.0, "-", closed_above=True)
         if self.tangential_restitution is not None:
             _within("tangential_restitution", self.tangential_restitution, 0.0, 1.0, "-", closed_above=True)
