@@ -268,7 +268,8 @@ class JointPair(Section):
     """Joints between chosen blocks that differ from the rest, or none; of several that fit, the last is used."""
 
     between: tuple[Name, Name] = Field(
-        description="two names: of blocks, groups or materials, ground (the ground) or tank (its floor)",
+        description="two names: of tables of the structure (a building, a wall, a town, ...), blocks, groups or "
+        "materials, ground (the ground) or tank (its floor)",
         examples=[["wall", "ground"]],
     )
     joined: Switch = Field(True, description="false: no joint")

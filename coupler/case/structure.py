@@ -82,7 +82,11 @@ class Opening(Section):
 class Building(Section):
     """Four walls of blocks, floors between the storeys and a roof."""
 
-    name: Name = Field("building", description="the group of all its blocks")
+    name: Name = Field(
+        "building",
+        description="for joints, gauges and results: all of its blocks, which are called NAME-wall0x--0-0-0 and so on; "
+        "their groups are wall, floor and roof",
+    )
     lower: Point = Field(description="lowest corner of the foot, outside of the walls", examples=[[30, 7, 0]])
     size: Size = Field(description="outside length, depth and height, roof included", examples=[[20, 10, 12]])
     wall_thickness: PositiveLength = Field(description="thickness of the walls", examples=["1 m"])

@@ -111,12 +111,14 @@ def _pair_law(case: Case, i: int, pair) -> Iterator[Problem]:
 
 
 def _names(case: Case, parts: list[Part]) -> list[str]:
-    """Names, groups and materials of blocks and solids, and of the planes that joints may be to."""
+    """Names of the tables of the structure; names, groups and materials of blocks and solids, and of the planes that
+    joints may be to."""
     from coupler.geometry.solids import obstacle_blocks
-    from coupler.scene.build import planes_of
+    from coupler.scene.build import names_of_part, planes_of
 
     blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
-    found = [name for b in blocks for name in (b.group, b.name, b.material) if name]
+    found = [name for part in parts for name in names_of_part(case, part)]
+    found += [name for b in blocks for name in (b.group, b.name, b.material) if name]
     for town in case.structure.town:  # whose houses may be missing for another reason, reported with it
         found += [name for name in (town.name, town.material, *(rule.material for rule in town.rule)) if name]
     return list(
@@ -143,4 +145,4 @@ def _joined_faces(case: Case, parts: list[Part]) -> tuple[list, list, list, list
     blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
     planes = planes_of(case)
     faces = touching_faces(blocks, planes)
-    return blocks, planes, faces, joint_rules(case.joints).of_faces(faces, blocks, planes)
+    return blocks, planes, faces, joint_rules(case, parts).of_faces(faces, blocks, planes)

@@ -5,7 +5,7 @@ A case without `[water]` imports no code of `fluid`, and a case without `[struct
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
@@ -177,7 +177,7 @@ def build_structure(case: Case):
             uplift=share_of(c),
         )
     if j:
-        joints = joint_rules(j)
+        joints = joint_rules(case, parts_of(case))
     gravity = (0.0, 0.0, -case.case.gravity)
     planes = planes_of(case)
     blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
@@ -206,16 +206,27 @@ def share_of(section) -> float | None:
     return {None: None, "full": 1.0, "none": 0.0, "share": section.uplift_share}[section.uplift]
 
 
-def joint_rules(joints):
-    """The rules of a section [joints] for all joints, for pairs of materials, and for the scatter of strengths."""
+def joint_rules(case: Case, parts: Sequence[Part]):
+    """The rules of the section [joints] for all joints, for pairs of what is named, and for the scatter of strengths.
+
+    parts: those that the blocks are from."""
     from yade_scripts.joints.rules import JointRules, PairJoints, Scatter
 
+    joints = case.joints
     pairs = tuple(
         PairJoints(*pair.between, joint_parameters(of_pair(joints, pair)) if pair.joined else None)
         for pair in joints.pair
     )
     scatter = joints.distribution and Scatter(joints.distribution, joints.variation, joints.seed)
-    return JointRules(joint_parameters(joints), pairs, scatter)
+    called = {block.name: names_of_part(case, part) for part in parts for block in part.blocks}
+    return JointRules(joint_parameters(joints), pairs, scatter, called if pairs else {})
+
+
+def names_of_part(case: Case, part: Part) -> tuple[str, ...]:
+    """The names of the tables that a part is from: its own, and for a house of a town that of the town."""
+    if part.path[1] != "town":
+        return (part.name,)
+    return part.name, case.structure.town[part.path[2]].name
 
 
 def of_pair(joints, pair):

@@ -67,6 +67,53 @@ def test_a_pair_changes_what_it_says_and_nothing_else(tmp_path):
     ]
 
 
+HOUSE = """
+[case]
+title = "house on a plinth"
+[time]
+end = 0.1
+[structure]
+[structure.ground]
+[[structure.building]]
+name = "house"
+lower = [0, 0, 0]
+size = [4, 4, 3]
+wall_thickness = 0.5
+block = [1, 1]
+[[structure.wall]]
+name = "garden"
+lower = [10, 0, 0]
+size = [3, 0.5, 1]
+block = [1, 0.5, 1]
+[contact]
+stiffness = 1e9
+[joints]
+strength = "1 MPa"
+opening_at_failure = "1 mm"
+[[joints.pair]]
+"""
+
+
+def on_the_ground(folder, pair):
+    """Names of the tables with joints to the ground, and the number of all joints."""
+    with build_structure(load(write(folder, HOUSE + pair)).case) as s:
+        return {s.names[a].partition("-")[0] for a, b in zip(s.joints.a, s.joints.b) if b < 0}, len(s.joints)
+
+
+def test_a_pair_takes_the_name_of_a_building(tmp_path):
+    """Its blocks have the groups wall, floor and roof, and the garden wall keeps its joints to the ground."""
+    every, count = on_the_ground(tmp_path, 'between = ["roof", "ground"]\njoined = false')
+    assert every == {"house", "garden"}
+    found, fewer = on_the_ground(tmp_path, 'between = ["house", "ground"]\njoined = false')
+    assert found == {"garden"}
+    assert fewer < count
+    found, fewer = on_the_ground(tmp_path, 'between = ["house", "house"]\njoined = false')
+    assert found == {"house", "garden"}
+    assert fewer < 0.5 * count
+    (line,) = mistakes(tmp_path, HOUSE + 'between = ["hous", "ground"]\njoined = false')
+    assert "nothing is called 'hous'; did you mean 'house'?" in line
+
+
 def test_random_strengths_are_those_of_the_seed(tmp_path):
     one, again, other = (
         [law.strength for law in laws(tmp_path, RANDOM.format(seed=seed)).values()] for seed in (1, 1, 2)

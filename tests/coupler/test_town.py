@@ -20,7 +20,7 @@ from coupler.program.errors import BadCase
 from coupler.program.extras import EXTRAS
 from coupler.run.clock import Clock
 from coupler.run.execute import drawn
-from coupler.scene.build import build
+from coupler.scene.build import build, build_structure
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -250,6 +250,17 @@ def test_footing_reaches_beyond_the_walls_as_a_pad(tmp_path):
     )
     (footing,) = solids_of(case)
     np.testing.assert_allclose(np.ptp(footing.vertices, axis=0)[:2], [11, 9])
+
+
+def test_pairs_of_joints_take_the_names_of_a_town_and_of_its_houses(tmp_path):
+    def on_footings(*sets):
+        with build_structure(loaded(tmp_path, *sets)) as s:
+            ends = [(s.names[a], s.names[b]) for a, b in zip(s.joints.a, s.joints.b) if b >= 0]
+        return {one.partition("-")[0] for one, other in ends if other.endswith("-footing")}
+
+    assert on_footings() == {"a", "b"}
+    for name, left in (("a", {"b"}), ("town", set())):
+        assert on_footings(f'joints.pair=[{{between=["{name}", "ground"], joined=false}}]') == left
 
 
 def test_ground_with_a_hole_is_the_only_mistake_that_is_reported(tmp_path):

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -78,11 +79,13 @@ def weibull_modulus(variation: float) -> float:
 
 @dataclass(frozen=True)
 class JointRules:
-    """everywhere: the law where no pair says otherwise · pairs: of several that fit, the last counts."""
+    """everywhere: the law where no pair says otherwise · pairs: of several that fit, the last counts · called: more
+    names of blocks for the pairs, such as that of their building, by the names of the blocks."""
 
     everywhere: JointParameters
     pairs: tuple[PairJoints, ...] = ()
     scatter: Scatter | None = None
+    called: Mapping[str, Collection[str]] = field(default_factory=dict, hash=False)
 
     @property
     def plain(self) -> bool:
@@ -93,7 +96,7 @@ class JointRules:
         self, faces: list[TouchingFaces], blocks: list[Block], planes: list[FixedPlane]
     ) -> list[JointParameters | None]:
         """The law of each pair of faces before strengths scatter, None: no joint."""
-        block_names = [{b.name, b.group, b.material} for b in blocks]
+        block_names = [{b.name, b.group, b.material, *self.called.get(b.name, ())} for b in blocks]
         plane_names = [{p.name, p.material} for p in planes]
         found = []
         for face in faces:
