@@ -8,6 +8,9 @@ from coupler.case.case import Case
 from coupler.case.types import KeyPath, Problem
 from coupler.program.errors import did_you_mean
 
+OF_POCKETS = ("gamma", "atmospheric", "smallest")
+"""Keys of [water.air] that only pockets of trapped air have."""
+
 
 def air_problems(case: Case, blocks: list[str]) -> Iterator[Problem]:
     """Everything about [water.air] and gauges of air; blocks: names of the blocks of the structure."""
@@ -18,6 +21,12 @@ def air_problems(case: Case, blocks: list[str]) -> Iterator[Problem]:
     if not trapped and air.vent:
         yield (*path, "vent"), 'open air needs no orifices: write model = "trapped", or leave them out'
     if not trapped:
+        for key in OF_POCKETS:
+            if getattr(air, key) != type(air).model_fields[key].default:
+                yield (
+                    (*path, key),
+                    'is for trapped air, of which open air has none: write model = "trapped", or leave it out',
+                )
         for i, gauge in enumerate(case.gauge):
             if gauge.kind == "air":
                 yield (

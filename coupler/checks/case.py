@@ -443,6 +443,8 @@ def _pairs(case: Case) -> Iterator[Problem]:
         first = seen.setdefault(frozenset(pair.materials), i)
         if first != i:
             yield (*path, "materials"), f"this pair is given by contact.pair[{first}] already; leave one out"
+        elif pair.friction is None and pair.uplift is None:
+            yield path, "says nothing of this pair: give friction, uplift or both, or leave it out"
 
 
 def _materials(case: Case) -> dict[str, None]:

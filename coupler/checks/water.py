@@ -60,6 +60,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
             "no water: write at least one [[water.fill]] with lower and upper, or an inflow or a sea",
         )
     yield from _walls(w)
+    yield from _without_effect(case)
     if case.tank is not None and is_measured(case.tank):
         wrong = list(_sides(case))
         yield from wrong
@@ -86,6 +87,22 @@ def water_remarks(case: Case) -> Iterator[str]:
                     f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
                     f"strikes; let its crest come later than {spec.crest:g} s"
                 )
+
+
+def _without_effect(case: Case) -> Iterator[Problem]:
+    """Keys that nothing reads in this case."""
+    w = case.water
+    if w.openings != "all" and w.covers == "single":
+        yield (
+            ("water", "openings"),
+            f"'{w.openings}' is for several sets of unknowns beside thin walls: write water.covers = \"multiple\", or "
+            "leave it out",
+        )
+    if w.cracks != "open" and case.joints is None:
+        yield (
+            ("water", "cracks"),
+            f"'{w.cracks}' is for joints that break, and there is no section [joints]; leave it out",
+        )
 
 
 def thin_water_remarks(case: Case) -> Iterator[str]:

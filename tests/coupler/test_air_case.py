@@ -27,6 +27,9 @@ SOLID = [{"centre": [1.0, 0.1, 0.5], "size": [0.2, 0.2, 0.2]}]
             {},
             "water.air.vent: open air needs no orifices",
         ),
+        ({"air": {"gamma": 1.2}}, {}, "water.air.gamma: is for trapped air, of which open air has none"),
+        ({"air": {"atmospheric": 9e4}}, {}, "water.air.atmospheric: is for trapped air"),
+        ({"air": {"smallest": 2}}, {}, "water.air.smallest: is for trapped air"),
         (TRAPPED, {"solid": SOLID}, 'write water.covers = "multiple"'),
         (
             {"air": {"model": "trapped", "vent": [{"at": [1, 0.1, 1.9], "area": "1 cm2"}]}},

@@ -265,6 +265,14 @@ def test_blocks_without_joints_need_a_contact_stiffness():
     assert reported(case(joints={"strength": 1e5, "opening_at_failure": 1e-3}, **loose)) == []
 
 
+def test_a_contact_pair_says_something_of_its_own():
+    for own, wrong in (({}, True), ({"friction": 0.0}, False), ({"uplift": "none"}, False)):
+        found = structure({"centre": [7, 5, 0.5]})
+        found["contact"]["pair"] = [{"materials": ["block", "tank"], **own}]
+        says = "contact.pair.0: says nothing of this pair: give friction, uplift or both, or leave it out"
+        assert reported(case(**found)) == [says] * wrong
+
+
 def test_a_motion_needs_its_block():
     found = reported(
         case(motion=[{"block": "b00", "velocity": [0, 0, 1]}], **structure({"centre": [7, 5, 0.5]}))

@@ -22,6 +22,8 @@ from tests.fakes import no_clock
         ({"walls": "no-slip"}, "water.walls: walls that hold the water need water.viscosity"),
         ({"walls": "friction"}, "friction needs water.roughness or water.manning"),
         ({"roughness": 0.01}, 'water.roughness: is for walls = "friction"'),
+        ({"openings": "wide"}, "water.openings: 'wide' is for several sets of unknowns beside thin walls"),
+        ({"cracks": "closed"}, "water.cracks: 'closed' is for joints that break"),
         ({"fill": []}, "no water: write at least one"),
         ({"sea": [{"side": "x+", "level": 1.5}]}, "z = 1.5 m is not between the floor"),
         (
@@ -311,6 +313,11 @@ def test_a_layer_on_other_water_is_not_thin():
     boxes = [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.3]}, {"lower": [0, 0, 0.3], "upper": [0.5, 0.2, 0.4]}]
     assert remarks(case({"fill": boxes})) == []
     assert "water at water.sea[0] is 0.1 m thin" in remarks(case({"sea": [{"side": "x+", "level": 0.1}]}))[0]
+
+
+def test_keys_are_refused_only_where_nothing_reads_them():
+    assert reported({"openings": "wide", "covers": "multiple"}) == []
+    assert reported({"openings": "all", "cracks": "open", "air": {"gamma": 1.4}}) == []
 
 
 def in_parts(water, **tank):
