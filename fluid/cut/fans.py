@@ -55,6 +55,15 @@ def fans(tet_part, tet, element_of_part, n_elements: int):
     return start, *_rows(tet, order)
 
 
+def tetrahedra_of(start, elements):
+    """The tetrahedra of elements (n,), where start (n_elements + 1,) is as of `fans`: place (T,) in `elements` of the
+    one that each belongs to, and number (T,) of the tetrahedron."""
+    count = start[elements + 1] - start[elements]
+    which = np.repeat(np.arange(len(elements)), count)
+    first = np.repeat(start[elements] - np.concatenate([[0], np.cumsum(count)[:-1]]), count)
+    return which, first + np.arange(len(which))
+
+
 @kernel
 def _rows(tet, order):
     """Volumes (n,) and corners (n, 4, 4) of the tetrahedra `order` (n,)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
+from fluid.cut.fans import tetrahedra_of
 from fluid.domain.moments import wet_fraction
 from fluid.domain.point_location import Places
 from fluid.readings.clip import clipped, volumes
@@ -130,9 +131,9 @@ def flux(water, at, edges) -> float:
 
 
 def volume_in_box(water, lower, upper) -> float:
-    """Water [m³] in the box from lower to upper (3,) [m]: exact for the surface φ = 0 as the cells have it.
-
-    A cell that the border of the box and a solid cut at once counts with its share outside the solid."""
+    """Water [m³] in the box from lower to upper (3,) [m]: exact for the surface φ = 0 as the cells have it, and for
+    solids with plane faces: of a cell that a solid and the border of the box cut at once, the tetrahedra that fill its
+    fluid part are clipped."""
     t = water.topology
     wet = t.cells_around(water.level_set < 0.0)
     x = t.nodes[t.cells[wet]]
@@ -140,19 +141,30 @@ def volume_in_box(water, lower, upper) -> float:
     beyond = ((x <= lower).all(axis=1) | (x >= upper).all(axis=1)).any(axis=1)
     whole, border = wet[inside], wet[~inside & ~beyond]
     total = float(wet_fraction(whole, water.level_set, t.parts) @ t.volume[whole])
-    return total + float(_in_box(water, border, lower, upper) @ t.fraction[border])
+    is_cut = t.parts.start[border] < t.parts.start[border + 1]
+    plain, cut = border[~is_cut], border[is_cut]
+    tets, phi = t.nodes[t.cells[plain]], water.level_set[t.cells[plain]]
+    total += float(_in_box(tets, phi, lower, upper) @ t.fraction[plain])
+    return total + float(_in_box(*_fans(water, cut), lower, upper).sum()) if len(cut) else total
 
 
-def _in_box(water, cells, lower, upper):
-    """Water (n,) [m³] of the cells (n,) inside the box, without subtracting solids."""
+def _fans(water, cut) -> tuple[Array, Array]:
+    """Corners (T, 4, 3) [m] of the tetrahedra that fill the fluid parts of cut cells (n,), and φ (T, 4) there."""
     t = water.topology
-    number = np.broadcast_to(np.arange(len(cells))[:, None, None], (len(cells), 4, 1))
-    parts = np.concatenate(
-        [t.nodes[t.cells[cells]], water.level_set[t.cells[cells]][..., None], number], axis=2
-    )
+    which, number = tetrahedra_of(t.parts.start, cut)
+    hats, nodes = t.parts.corners[number], t.cells[cut[which]]
+    phi = np.einsum("tqa,ta->tq", hats, water.level_set[nodes])
+    return np.einsum("tqa,tak->tqk", hats, t.nodes[nodes]), phi
+
+
+def _in_box(tets, phi, lower, upper):
+    """Volume (n,) [m³] of the part inside the box of tetrahedra (n, 4, 3) [m] in which φ, with the corner values
+    (n, 4), is negative."""
+    number = np.broadcast_to(np.arange(len(tets))[:, None, None], (len(tets), 4, 1))
+    parts = np.concatenate([tets, phi[..., None], number], axis=2)
     for axis in range(3):
         parts = clipped(parts, lower[axis] - parts[:, :, axis])
         parts = clipped(parts, parts[:, :, axis] - upper[axis])
     parts = clipped(parts, parts[:, :, 3])
-    of_cell = np.rint(parts[:, 0, 4]).astype(np.int64)
-    return np.bincount(of_cell, volumes(parts), minlength=len(cells))
+    of_tet = np.rint(parts[:, 0, 4]).astype(np.int64)
+    return np.bincount(of_tet, volumes(parts), minlength=len(tets))

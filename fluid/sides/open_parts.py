@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array, Ints
+from fluid.cut.fans import tetrahedra_of
 
 ON_FACE = 1e-9
 """Hat value below which a corner of a tetrahedron lies on the face of its cell."""
@@ -53,12 +54,8 @@ def open_triangles(domain, cell, corner):
 
 def _on_faces(domain, face, element, corner):
     """The same for cut elements: the faces of their tetrahedra on which the hat function of the corner is zero."""
-    count = domain.fan_start[element + 1] - domain.fan_start[element]
-    which = np.repeat(np.arange(len(element)), count)
-    first = np.repeat(domain.fan_start[element] - np.concatenate([[0], np.cumsum(count)[:-1]]), count)
-    corners = domain.fan_corners[
-        first + np.arange(len(which))
-    ]  # (T, corner of the tetrahedron, hat of the cell)
+    which, number = tetrahedra_of(domain.fan_start, element)
+    corners = domain.fan_corners[number]  # (T, corner of the tetrahedron, hat of the cell)
     off = np.abs(np.take_along_axis(corners, corner[which][:, None, None], axis=2)[:, :, 0]) > ON_FACE
     there = off.sum(axis=1) == 1
     which, corners = which[there], corners[there]

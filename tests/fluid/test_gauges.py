@@ -9,7 +9,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.point_location import Outside
 from fluid.readings import gauges
 from fluid.readings.clip import clipped, volumes
-from tests.fluid.scenes import advance, column, load, tank
+from tests.fluid.scenes import advance, column, load, rotation, tank
 
 
 @pytest.fixture(scope="module")
@@ -184,6 +184,32 @@ def test_boxes_that_share_a_border_share_the_water():
     left = gauges.volume_in_box(water, [0, 0, 0], [cut, 1, 1])
     right = gauges.volume_in_box(water, [cut, 0, 0], [1, 1, 1])
     assert left + right == pytest.approx(water.volume(), rel=1e-9)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.floats(0.0, 0.97), min_size=3, max_size=3), st.floats(0.02, 0.6), st.floats(0.1, 0.9))
+def test_volume_in_any_box_beside_a_solid(lower, edge, level):
+    """What the box and the solid have in common is taken out, wherever both end inside the same cells."""
+    low, high = np.array([0.37, 0.29, 0.0]), np.array([0.71, 0.66, 0.55])
+    solid = ConvexBodies.boxes([(low + high) / 2], [high - low])
+    water = tank([1, 1, 1], 0.25, lambda x: x[:, 2] - level, solid)
+    lower, upper = np.array(lower), np.minimum(np.add(lower, edge), [1.0, 1.0, level])
+    common = np.minimum(upper, high) - np.maximum(lower, low)
+    exact = np.maximum(upper - lower, 0.0).prod() - np.maximum(common, 0.0).prod()
+    if lower[2] >= level:
+        exact = 0.0
+    assert gauges.volume_in_box(water, lower, np.add(lower, edge)) == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_volume_beside_a_slanting_solid(covers):
+    """A square of half a diagonal of 0.31 m on edge: beyond x = 0.6 m it takes a triangle of 0.21² m² of the box."""
+    solid = ConvexBodies.boxes(
+        [[0.5, 0.5, 0.5]], [[0.31 * 2**0.5] * 2 + [2.0]], [rotation([0, 0, 1], np.pi / 4)]
+    )
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.437, solid, covers=covers)
+    found = gauges.volume_in_box(water, [0.6, 0, 0.1], [1, 1, 1])
+    assert found == pytest.approx((0.4 - 0.21**2) * 0.337, rel=1e-9)
 
 
 def test_parts_of_a_clipped_cell_fill_it():
