@@ -3,6 +3,7 @@
 gauges       level, pressure, velocity, flux and volume at given places
 clip         tetrahedra clipped by half spaces
 closed_off   water that no air reaches
+solid_spans  what solids take of upright lines
 
 Reads a `Water` and changes nothing.  Imports `domain`, `sides` and the chapters below them.
 """

@@ -9,19 +9,20 @@ from fluid.cut.fans import tetrahedra_of
 from fluid.domain.moments import wet_fraction
 from fluid.domain.point_location import Places
 from fluid.readings.clip import clipped, volumes
+from fluid.readings.solid_spans import Spans, solid_spans
 from fluid.sides.inflow import wet_shares
 
 SAMPLES_PER_CELL = 4
 HALVINGS = 10
-"""Halvings of the distance between two samples to find where a solid or the bed begins."""
+"""Halvings of the distance between two samples to find where the bed begins."""
 
 
 def level(water, xy) -> float:
     """Depth [m] of water over xy (2,) [m]: the wet length of a vertical line, as a wire gauge measures it.
 
-    φ is sampled on the line, SAMPLES_PER_CELL times in a cell, and taken as linear between samples; the inside of
-    solids counts as dry. Spray and the space under an overturning crest do not count; over a solid on the
-    floor the depth is that above it. Raises Outside for a place outside the mesh."""
+    φ is sampled on the line, SAMPLES_PER_CELL times in a cell and where the line enters and leaves solids, and taken as
+    linear between samples; the inside of solids counts as dry. Spray and the space under an overturning crest do not
+    count; over a solid on the floor the depth is that above it. Raises Outside for a place outside the mesh."""
     return float(levels(water, [xy])[0])
 
 
@@ -33,41 +34,98 @@ def levels(water, places, foot=None) -> Array:
     low, high = water.mesh.bounds[:, 2]
     count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.finest)) + 1
     z = np.linspace(low, high, count)
-    lines = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
-    phi = Places.of(water, lines, beyond=True).read(water.level_set).reshape(-1, count)
+    solid = _with_feet(solid_spans(water, places), foot, low)
+    through = np.unique(solid.line)
+    samples = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
+    ends = np.column_stack([np.tile(places[solid.line], (2, 1)), np.concatenate([solid.low, solid.high])])
+    phi = Places.of(water, np.concatenate([samples, ends]), beyond=True).read(water.level_set)
+    phi, at_ends = phi[: len(samples)].reshape(-1, count), phi[len(samples) :]
     phi[z < foot[:, None]] = np.nan
-    wet = np.fmax(-phi, 0.0)  # NaN inside solids and outside a mesh of another shape than a box
-    length = np.abs(np.diff(phi, axis=1))
-    share = np.divide(np.abs(np.diff(wet, axis=1)), length, out=(wet[:, 1:] > 0.0) * 1.0, where=length > 0.0)
-    both = (phi[:, 1:] < 0.0) & (phi[:, :-1] < 0.0)
+    clear = np.ones(len(places), bool)
+    clear[through] = False
+    depth = np.zeros(len(places))
+    depth[clear] = _in_the_open(water, places[clear], foot[clear], z, phi[clear])
+    if len(through):
+        there = solid._replace(line=np.searchsorted(through, solid.line))
+        depth[through] = _between_solids(
+            water, places[through], foot[through], z, phi[through], there, at_ends
+        )
+    return depth
+
+
+def _with_feet(solid: Spans, foot, low: float) -> Spans:
+    """The spans of solids, and on the lines that have some all that lies under their foot (m,) [m]."""
+    below = np.unique(solid.line)
+    below = below[foot[below] > low]
+    added = (below, np.full(len(below), low), foot[below])
+    return Spans(*(np.concatenate(both) for both in zip(solid, added)))
+
+
+def _in_the_open(water, places, foot, z, phi) -> Array:
+    """Wet length (m,) [m] of lines that pass through no solid, with φ (m, count) at the heights z (count,) [m]."""
     is_open = np.isfinite(phi)
     open_water = is_open[:, 1:] & is_open[:, :-1]
-    depth = np.array(
-        [(z[1] - z[0]) * row[here].sum() for row, here in zip(np.where(both, 1.0, share), open_water)]
-    )
-    return depth + _beside_solids(water, places, foot, z, phi, is_open)
-
-
-def _beside_solids(water, places, foot, z, phi, is_open) -> Array:
-    """Wet length (m,) [m] between the last sample in a solid, or below the bed, and the first in the open; where the
-    solid ends is found by halving."""
-    found = np.zeros(len(places))
+    share = _wet_share(phi[:, :-1], phi[:, 1:])
+    depth = np.array([(z[1] - z[0]) * row[here].sum() for row, here in zip(share, open_water)])
     row, k = np.nonzero(is_open[:, 1:] != is_open[:, :-1])
     inner = np.where(is_open[row, k], k, k + 1)
     wet = phi[row, inner] < 0.0
     row, k, inner = row[wet], k[wet], inner[wet]
-    if len(row) == 0:
-        return found
-    inside, outside = z[inner], z[np.where(inner == k, k + 1, k)]
+    outer = np.where(inner == k, k + 1, k)
+    below = np.zeros(len(places))
+    np.add.at(below, row, _up_to_the_bed(water, places[row], foot[row], z[inner], z[outer]))
+    return depth + below
+
+
+def _between_solids(water, places, foot, z, phi, solid: Spans, at_ends) -> Array:
+    """The same of lines that pass through solids, whose ends on the lines are samples as well, with φ at_ends (2 k,):
+    first at the lower ends, then at the upper ones."""
+    line = np.concatenate([np.repeat(np.arange(len(places)), len(z)), solid.line, solid.line])
+    height = np.concatenate([np.tile(z, len(places)), solid.low, solid.high])
+    phi = np.concatenate([phi.ravel(), at_ends])
+    entered = np.zeros(len(line), np.int64)
+    entered[-2 * len(solid.line) : -len(solid.line)] = 1
+    entered[-len(solid.line) :] = -1
+    order = np.lexsort((height, line))
+    free = (np.cumsum(entered[order]) == 0)[:-1] & (line[order[1:]] == line[order[:-1]])
+    low, high = order[:-1][free], order[1:][free]
+    is_open = np.isfinite(phi)
+    both, one = is_open[low] & is_open[high], is_open[low] != is_open[high]
+    wet = np.where(both, _wet_share(phi[low], phi[high]), 0.0) * (height[high] - height[low])
+    depth = np.bincount(line[low], wet, minlength=len(places))
+    inner = np.where(is_open[low], low, high)[one]
+    outer = np.where(is_open[low], high, low)[one]
+    inner, outer = inner[phi[inner] < 0.0], outer[phi[inner] < 0.0]
+    row = line[inner]
+    np.add.at(depth, row, _up_to_the_bed(water, places[row], foot[row], height[inner], height[outer]))
+    return depth
+
+
+def _wet_share(one, other) -> Array:
+    """Share of the way between two samples in the water, where φ is linear between its values one and other (...)."""
+    wet, wet_other = (
+        np.fmax(-one, 0.0),
+        np.fmax(-other, 0.0),
+    )  # NaN outside a mesh of another shape than a box
+    length = np.abs(other - one)
+    share = np.divide(np.abs(wet_other - wet), length, out=(wet_other > 0.0) * 1.0, where=length > 0.0)
+    return np.where((other < 0.0) & (one < 0.0), 1.0, share)
+
+
+def _up_to_the_bed(water, places, foot, inside, outside) -> Array:
+    """Wet length (n,) [m] from the last samples in the open, at the heights inside (n,) [m], towards those beyond the
+    bed or in the seam of solids, at outside (n,) [m]; where the open ends is found by halving."""
+    if len(places) == 0:
+        return np.zeros(0)
+    first = inside
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
         # together with the samples in the open: points that all lie outside the mesh would not be looked up
-        points = np.column_stack([np.tile(places[row], (2, 1)), np.concatenate([middle, z[inner]])])
-        free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set)[: len(row)])
-        free &= middle >= foot[row]
+        points = np.column_stack([np.tile(places, (2, 1)), np.concatenate([middle, first])])
+        free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set)[: len(places)])
+        free &= middle >= foot
         inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
-    np.add.at(found, row, np.abs(0.5 * (inside + outside) - z[inner]))
-    return found
+    return np.abs(0.5 * (inside + outside) - first)
 
 
 def pressure(water, points):
