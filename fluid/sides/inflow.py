@@ -240,11 +240,16 @@ class Sides:
     def through(self, phi, u, dt: float, carried):
         """Volume (N,) [m³] that enters at the inflows over dt [s] (negative: leaves, at most the water carried (N,)
         [m³]), and its rate (N,) [m³/s], which the pressure equation needs."""
+        rate = self.flow_rate(phi, u)
+        return np.maximum(dt * rate, -np.maximum(carried, 0.0)), rate
+
+    def flow_rate(self, phi, u):
+        """q (N,) [m³/s] of equation (1) at the nodes of the inflows; phi (N,), u (N, 3) [m/s]."""
         rate = np.zeros(len(phi))
         for side in self.now:
             if not side.is_sea:
                 rate += side.rate(phi, u)
-        return np.maximum(dt * rate, -np.maximum(carried, 0.0)), rate
+        return rate
 
     def exchanged(self, topology, phi, carried):
         """Volume (N,) [m³] that enters from the seas (negative: leaves): the water at their nodes below the level set φ
@@ -274,6 +279,11 @@ class Sides:
         self.entered += float(volume[volume > 0.0].sum())
         self.left -= float(volume[volume < 0.0].sum())
         self.energy += float(volume @ head) + ahead
+
+    def flowing(self) -> Array:
+        """Nodes (n,) of the inflows."""
+        found = [side.nodes for side in self.now if not side.is_sea]
+        return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)
 
     def nodes(self) -> Array:
         """Nodes (n,) of all sides."""

@@ -129,7 +129,8 @@ def test_absorbing_side_goes_on_when_the_water_has_left_it(tmp_path):
 
 def test_absorbing_side_before_ground_up_to_the_lid_is_refused(tmp_path):
     case = beach(tmp_path, 0.3, 0.0)
-    beyond = replace(mesh_of(case.tank), spacing=20.0)
+    mesh = mesh_of(case.tank)
+    beyond = replace(mesh, axes=(mesh.axes[0][0] + np.array([0.0, 20.0]), *mesh.axes[1:]))
     with pytest.raises(
         AbsorbingSideBlocked, match=r"side x- absorbs, but 20 m inside.*reaches its upper side"
     ):

@@ -358,3 +358,15 @@ def test_wave_that_comes_through_four_sides_at_an_angle_is_the_same_inside():
     assert found[crest] == pytest.approx(wanted.max(), rel=0.1)
     assert time[crest] == pytest.approx(time[wanted.argmax()], abs=0.2)
     assert angle[crest] == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_start_of_an_inflow_is_in_the_books():
+    """Its nodes are given their velocity at once and without a force, half a cell of water, and the pressure that sets
+    the rest in motion acts over half of the way: what the water gains, less what damping takes of it again."""
+    water = tank([2, 1, 1], 0.25, lambda x: x[:, 2] - 0.5, waves.steady(np.array([1.0, 0, 0]), 0.5, 0.8))
+    advance(water, 1e-4)
+    change = dict(water.report.energy_change)
+    lost = -change.pop("damping and limit")
+    assert lost > 0.0
+    assert sum(change.values()) > 40.0
+    assert water.energy_through_sides() == pytest.approx(sum(change.values()), rel=0.02)
