@@ -25,7 +25,7 @@ from yade_scripts.dynamics.readings import StructureReadings
 from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.dynamics.state import StructureState, check_belongs
 from yade_scripts.dynamics.substep import Substepper
-from yade_scripts.dynamics.timestep import SubstepLimit, substep_limit
+from yade_scripts.dynamics.timestep import SubstepLimit, contact_limits, substep_limit
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.joints import Joints
 from yade_scripts.joints.rules import JointRules
@@ -105,6 +105,9 @@ class Structure(StructureReadings):
         self._shares = np.array([share for _, share in faces.partly])
         self._set_friction_of_failed_points()
         self.face_stiffness = self._face_stiffness()
+        self._contact_stable = (
+            None if contact is None else contact_limits(self.blocks, self.face_stiffness, contact)
+        )
         self._set_damping()
         self._substep = substep
         if substep is not None:
@@ -261,11 +264,17 @@ class Structure(StructureReadings):
     def substep_limit(self) -> SubstepLimit:
         """Largest substep and what limits it; found anew when joints have failed."""
         if self._limit is None:
-            stiffness = self.face_stiffness if self.contact is not None else None
             damping = 0.0 if self.joints is None else self.joints.parameters.damping
-            contact_damping = 0.0 if self.contact is None else self.contact.damping_ratio
             asleep = None if self._sleep is None else self._sleep.asleep
-            self._limit = substep_limit(self.blocks, self.joints, stiffness, damping, contact_damping, asleep)
+            self._limit = substep_limit(
+                self.blocks,
+                self.joints,
+                self.face_stiffness,
+                damping,
+                self.contact,
+                self._contact_stable,
+                asleep,
+            )
         return self._limit
 
     def stable_substep(self) -> tuple[float, str]:
