@@ -7,6 +7,7 @@ types, units, materials                           the quantities in the tables, 
 keys, docs, messages, editor_schema               the schema read as data; pages, refusals, JSON Schema made from it
 schedule                                          output times, times of checkpoints
 promises, records, inflow_records                 `expected.toml`, tables of measurements, records of inflows
+formula                                           formulas of names of the case, in studies and sweeps
 paths, toml_lines, toml_text                      files that a case names, lines of its keys, plain data as TOML
 study_names, sweep_names                          names in a study or sweep: that they exist and are free
 first_cases, templates                            small cases that `surgebreak init` writes, and their texts

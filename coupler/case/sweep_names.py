@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from functools import lru_cache
 
+from coupler.case.formula import BadFormula, names_used
 from coupler.case.keys import keys
 from coupler.case.study_names import without_places
 from coupler.case.sweep import PARAMETERS, Sweep, Varied
-from coupler.case.types import Problem
+from coupler.case.types import KeyPath, Problem
 from coupler.case.units import DIMENSIONS, to_si
 from coupler.program.errors import UnitError, did_you_mean
 
@@ -16,6 +17,8 @@ OWN = (
     "run", "point", "sample", "repeat", "id", "outcome", "reason", "cpu_seconds", "wall_seconds", "memory", "attempts",
 )  # fmt: skip
 """Columns of the table of every sweep, beside what is varied, seeds and quantities."""
+NUMBERS = ("run", "point", "sample", "repeat")
+"""Those of them that formulas may name."""
 PLAIN = {
     "time": ("time that was reached", "s"),
     "joints": ("joints at the start", ""),
@@ -33,6 +36,10 @@ def sweep_problems(sweep: Sweep) -> Iterator[Problem]:
     yield from _keys(sweep)
     yield from _amounts(sweep)
     yield from _columns(sweep)
+    yield from _formulas(sweep)
+    yield from _names_in_formulas(
+        sweep, {key.rpartition(".")[2] for key in _settable()}
+    )  # --vary may add these
     yield from _uses(sweep)
 
 
@@ -50,6 +57,7 @@ def design_problems(sweep: Sweep) -> Iterator[Problem]:
         yield ("sweep", "sample"), "saltelli needs two distributions or more, and neither lists nor grids"
     if sweep.sensitivity and not drawn:
         yield ("sweep", "sensitivity"), "no distribution in sweep.vary whose share could be computed"
+    yield from _names_in_formulas(sweep)
 
 
 def _keys(sweep: Sweep) -> Iterator[Problem]:
@@ -109,6 +117,49 @@ def _columns(sweep: Sweep) -> Iterator[Problem]:
     yield from _twice(("sweep", "fragility"), [f.name for f in sweep.fragility])
     for k, f in enumerate(sweep.fragility):
         yield from _twice(("sweep", "fragility", k, "state"), [state.name for state in f.state])
+
+
+def seed_column(key: str) -> str:
+    """Name of the column of a seed."""
+    return key.replace(".", "_").replace("[", "_").replace("]", "")
+
+
+def _formulas(sweep: Sweep) -> Iterator[Problem]:
+    """Formulas that are none, whatever their names stand for."""
+    for i, link in enumerate(sweep.link):
+        yield from _no_formula(("sweep", "link", i, "formula"), link.formula)
+    for i, q in enumerate(sweep.quantity):
+        if q.formula is not None:
+            yield from _no_formula(("sweep", "quantity", i, "formula"), q.formula, q.table is not None)
+
+
+def _no_formula(place: KeyPath, formula: str, of_columns: bool = False) -> Iterator[Problem]:
+    try:
+        names_used(formula, of_columns)
+    except BadFormula as error:
+        yield place, str(error)
+
+
+def _names_in_formulas(sweep: Sweep, more: Collection[str] = ()) -> Iterator[Problem]:
+    """Names in formulas of quantities that are neither columns, with `more` that there may be, nor names of the case;
+    columns of histories are known only from a run, those of sweep.table from its file."""
+    varied = [v.column for v in sweep.vary] + [seed_column(key) for key in sweep.seeds]
+    known = [key.path for key in keys() if "." in key.path]
+    for i, q in enumerate(sweep.quantity):
+        place = ("sweep", "quantity", i, "formula")
+        if q.formula is None or q.table is not None or any(_no_formula(place, q.formula)):
+            continue
+        columns = [*varied, *(above.name for above in sweep.quantity[:i]), *NUMBERS]
+        for name in names_used(q.formula):
+            plain = ".".join(without_places(name))
+            may_be = "." not in plain and (sweep.table is not None or plain in more)
+            if plain not in columns and plain not in known and not may_be:
+                yield (
+                    place,
+                    f"'{q.formula}': there is no '{name}'{did_you_mean(plain, [*columns, *known])}; without table a "
+                    f"formula takes names of the case, quantities above it and columns of the sweep, here: "
+                    f"{', '.join(columns)}",
+                )
 
 
 def _twice(place: tuple, names: list[str]) -> Iterator[Problem]:

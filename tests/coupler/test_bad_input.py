@@ -9,11 +9,11 @@ import meshio
 import numpy as np
 import pytest
 
+from coupler.case.formula import BadFormula, evaluate
 from coupler.case.paths import BadPath, read_text
 from coupler.case.records import NoSuchData, read_record
 from coupler.checks.read_case import load
 from coupler.checks.tables import column_names
-from coupler.commands.study.formula import BadFormula, evaluate
 from coupler.geometry.mesh_files import MeshFileError, read_mesh, readable
 from coupler.geometry.solids import solids_of
 from coupler.program.errors import BadCase, briefly

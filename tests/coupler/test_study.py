@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from coupler.case.formula import BadFormula
 from coupler.commands.study import command, runner
-from coupler.commands.study.formula import BadFormula
 from coupler.commands.study.plan import make_plan
 from coupler.program.errors import BadCase, ExitCode
 

@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from coupler.case.case import effective
+from coupler.case.formula import BadFormula, evaluate
 from coupler.checks.read_case import load
-from coupler.commands.study.formula import BadFormula, evaluate
 from coupler.program.errors import BadCase
 
 from .fake_runs import CASE
@@ -84,6 +84,7 @@ def test_formulas_know_names_and_functions_of_a_case():
         ("open", "the case has no open"),
         ("joints", "float"),
         ("sqrt(-1)", "math domain"),
+        ("(1).real", "neither a number"),
     ],
 )
 def test_formulas_are_arithmetic_and_nothing_else(formula, says):

@@ -118,6 +118,74 @@ formula = "opening * joints.strength / 1e6"
     assert [c.joints.opening_at_failure for c in cases] == pytest.approx([0.001, 0.003])
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (
+            'formula = "slid > 0.05"',
+            "slid > 0.05 is neither a number, a name nor an operation (+ - * / **); functions: sqrt",
+        ),
+        ('formula = "slid *"', "'slid *': not a formula"),
+        ('formula = "abs(slid)"', "abs(slid) is neither a number"),
+        ('formula = "(slid).real"', "there is no 'slid.real'"),
+        ('formula = "(2 * slid).real"', "(2 * slid).real is neither a number"),
+        ('formula = "later / 2"', "there is no 'later'"),
+        (
+            'formula = "slip / 2"',
+            "there is no 'slip'; did you mean 'slid'?; without table a formula takes names of the",
+        ),
+        (
+            'formula = "slid / joints.strenght"',
+            "there is no 'joints.strenght'; did you mean 'joints.strength'?",
+        ),
+        ('table = "history/gauges.csv"\nformula = "value >= 2"', "value >= 2 is neither a number"),
+    ],
+)
+def test_a_bad_formula_is_refused_when_the_case_is_read(case, given, says):
+    """It was found when the table was written, after the last run."""
+    place = case(
+        f"""
+[[sweep.vary]]
+key = "joints.strength"
+values = ["0.5 MPa", "1 MPa"]
+[[sweep.quantity]]
+name = "slid"
+figure = "largest_water_force"
+[[sweep.quantity]]
+name = "far"
+{given}
+[[sweep.quantity]]
+name = "later"
+figure = "joints"
+"""
+    )
+    with pytest.raises(BadCase) as reported:
+        load(place)
+    assert "sweep.quantity[1].formula" in str(reported.value)
+    assert says in str(reported.value)
+
+
+def test_formulas_take_columns_of_the_sweep_and_names_of_the_case(case):
+    text = """
+[sweep]
+seeds = ["joints.seed"]
+[[sweep.vary]]
+key = "joints.strength"
+values = ["0.5 MPa", "1 MPa"]
+[[sweep.quantity]]
+name = "force"
+figure = "largest_water_force"
+[[sweep.quantity]]
+name = "share"
+formula = "force / strength + structure.block[0].size[2] * joints.strength + sqrt(run * repeat - joints_seed) / end"
+"""
+    place = case(text)
+    assert load(place).case.sweep.quantity[1].name == "share"
+    with pytest.raises(BadCase, match=r"quantity\[1\].formula: .*there is no 'end'"):
+        make_plan(place)
+    assert len(make_plan(place, ["time.end=10 ms,20 ms"]).runs) == 4
+
+
 DRAWN = """
 [sweep]
 sample = "{sample}"

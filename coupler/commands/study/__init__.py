@@ -5,7 +5,6 @@ study_run  (beside this package) one run in this process, with the processor tim
 runner     makes the runs one after the other; completed runs are not repeated
 reading    the value of a quantity in a run
 reference  the reference of a quantity: exact, measured, or the finest run
-formula    formulas of keys of the case
 results    errors of all runs
 order      observed order of convergence
 laws       ladders of laws, ours and YADE's own

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.case.formula import evaluate
 from coupler.case.records import column as table_column
 from coupler.case.records import read_record
 from coupler.case.study import Quantity
-from coupler.commands.study.formula import evaluate
 from coupler.commands.study.reading import Curve, taken
 from coupler.program.errors import BadCase
 

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from coupler.case.case import effective
+from coupler.case.formula import BadFormula, evaluate
 from coupler.case.paths import BadPath, place_of
 from coupler.case.sweep import NEEDS, Sweep, Varied
 from coupler.case.sweep_names import OWN, amount, design_problems, in_si, sweep_problems, unit, unit_of
 from coupler.case.toml_lines import shown
 from coupler.case.toml_text import inline
 from coupler.checks.read_case import CaseFile, load, parse_path
-from coupler.commands.study.formula import BadFormula, evaluate
 from coupler.commands.study.plan import fingerprint
 from coupler.commands.sweep.draw import cube, distribution, quantiles, seed_of
 from coupler.commands.sweep.quantities import asked

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from array_types import Array
+from coupler.case.formula import BadFormula, evaluate_columns
 from coupler.case.sweep import Sweep, SweepQuantity
 from coupler.case.sweep_names import PLAIN
-from coupler.commands.study.formula import BadFormula, evaluate_columns
 from coupler.commands.study.plan import fingerprint
 from coupler.commands.study.reading import Curve, read, taken
 from coupler.program.errors import BadCase, SurgebreakError, did_you_mean

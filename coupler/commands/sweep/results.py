@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from coupler.commands.study.formula import BadFormula, evaluate
+from coupler.case.formula import BadFormula, evaluate
+from coupler.case.sweep_names import seed_column
 from coupler.commands.sweep.folder import Spec, figures, number, read_spec
 from coupler.commands.sweep.one import FINAL
 from coupler.commands.sweep.plan import Row
@@ -79,11 +80,6 @@ def _columns(spec: Spec) -> Iterator[Column]:
 
 def _sets(keys: tuple[str, ...]) -> str:
     return f": sets {', '.join(keys)}" if keys else ""
-
-
-def seed_column(key: str) -> str:
-    """Name of the column of a seed."""
-    return key.replace(".", "_").replace("[", "_").replace("]", "")
 
 
 def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
