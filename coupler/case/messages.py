@@ -7,6 +7,7 @@ from typing import get_args
 
 from coupler.case.gauges import Gauge
 from coupler.case.keys import Key, find, keys, names_in, sections_of
+from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath
 from coupler.case.water import Inflow
 from coupler.program.errors import briefly, did_you_mean
@@ -43,6 +44,8 @@ def explain_error(error: dict) -> tuple[KeyPath, str]:
         return _kind(path, kind, context)
     if kind == "value_error":
         return path, str(context["error"])
+    if kind in ("tuple_type", "list_type") and isinstance(value, str) and _quoted(value, key):
+        return path, _unquoted(path, value, key)
     return path, _shape(kind, value, context, key, error["msg"])
 
 
@@ -132,6 +135,42 @@ def _kind(path: KeyPath, kind: str, context: dict) -> tuple[KeyPath, str]:
     tag = str(context["tag"])
     return (*path, "kind"), f"{briefly(tag)} is not known; one of {', '.join(kinds)}" + did_you_mean(
         tag, kinds
+    )
+
+
+def _quoted(value: str, key: Key | None) -> list[str]:
+    """The items that a text was meant to be as a list, texts in quotes; none where it was hardly meant as one."""
+    inside = value.strip()
+    if inside.startswith("[") and inside.endswith("]"):
+        inside = inside[1:-1]
+    elif not _words(key):
+        return []
+    items = [item.strip().strip("\"'") for item in inside.split(",")]
+    if key is None or key.several or any(set("[]{}=\"'") & set(item) or not item for item in items):
+        return []
+    return [item if _is_number(item) else f'"{item}"' for item in items]
+
+
+def _is_number(item: str) -> bool:
+    try:
+        float(item)
+    except ValueError:
+        return False
+    return True
+
+
+def _words(key: Key | None) -> str:
+    """What the items of a list of known words may be, in words; empty for other keys."""
+    return key.limits.replace(" | ", ", ") if key is not None and " | " in key.limits else ""
+
+
+def _unquoted(path: KeyPath, value: str, key: Key | None) -> str:
+    """A list of texts without quotes, which the command line takes away unless the whole of it is quoted."""
+    meant, allowed = f"[{', '.join(_quoted(value, key))}]", _words(key)
+    return (
+        f"{briefly(value)} is not a list, in which names and numbers with units need quotes; write {meant}, on the "
+        f"command line --set '{shown(path)}={meant}'; "
+        + (f"each is one of {allowed}" if allowed else _is(key))
     )
 
 

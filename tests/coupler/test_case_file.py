@@ -205,6 +205,23 @@ def test_overrides_change_values_like_the_file(tmp_path):
             "--set structure.block.density=1: 'density' is inside a list; say which item",
         ),
         ("time.end.x=1", "--set time.end.x=1: 'x' is below a value"),
+        (
+            "tank.open=[z-]",
+            "--set tank.open=[z-]: tank.open: '[z-]' is not a list, in which names and numbers with units need quotes; "
+            """write ["z-"], on the command line --set 'tank.open=["z-"]'; each is one of x-, x+, y-, y+, z-, z+""",
+        ),
+        (
+            "tank.open=z-, x+",
+            "--set tank.open=z-, x+: tank.open: 'z-, x+' is not a list, in which names and numbers with units need "
+            """quotes; write ["z-", "x+"], on the command line --set 'tank.open=["z-", "x+"]'; each is one of x-""",
+        ),
+        (
+            "water.fill[0].upper=[1 m, 2, 50 cm]",
+            "--set water.fill[0].upper=[1 m, 2, 50 cm]: water.fill[0].upper: '[1 m, 2, 50 cm]' is not a list, in which "
+            """names and numbers with units need quotes; write ["1 m", 2, "50 cm"], on the command line """
+            """--set 'water.fill[0].upper=["1 m", 2, "50 cm"]'; corner with the largest coordinates [m]""",
+        ),
+        ("tank.upper=3 m", "--set tank.upper=3 m: tank.upper: '3 m' is not a list of numbers; "),
     ],
 )
 def test_a_bad_override_is_reported_with_its_place(tmp_path, override, message):
