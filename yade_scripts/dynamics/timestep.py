@@ -1,6 +1,7 @@
 """Time step of the structure: accuracy of joints and contacts, with the pair of blocks that limits it.
 
-    dt = min( 0.1 * 2/ω_max,  0.2 sqrt(m/K) ),   ω_max² ≤ max over blocks of the largest eigenvalue of M_i⁻¹ Σ c K_ii
+    dt = min( 0.1 * 2/ω_max,  0.2 sqrt(m/K),  0.9 of the limit (1) of contacts below ),
+    ω_max² ≤ max over blocks of the largest eigenvalue of M_i⁻¹ Σ c K_ii
 
 K_ii: what a joint holds block i with; c = 2, since |d_a - d_b|² ≤ 2 |d_a|² + 2 |d_b|², or 1 where d_b = 0 is fixed.
 As M_i⁻¹ Σ K_ii is part of the whole, the bound is at most √2 of the exact ω_max. The explicit limit is 2/ω_max; a
@@ -26,8 +27,9 @@ K is less; any part of the nodes of one face stays within the bound of two (boxe
 of 0 to 2, all parts). With one face in place of two, (1) is within 10 % of where the energy of a cube on the ground
 begins to grow, which is at 1.7 to 2.2 times the bound of two (K_t/K of 0.5 to 10, e of 0.3 and 0.1). The limit is never
 longer than √(m/K) (√(1 + ζ²) - ζ), beyond which a touch lasts less than three substeps. Not covered: more than two
-faces in contact at a time, several blocks of the whole stiffness K each on one face, and joints and contacts of one
-block together.
+faces in contact at a time, smaller blocks that press with the whole stiffness K on a corner of a larger one, or several
+on one face, faces that meet equally large ones of stiffer joints (up to 2 K), and joints and contacts of one block
+together.
 """
 
 from __future__ import annotations
