@@ -5,6 +5,7 @@ case                                         sections that need each other, name
 places, motion, joints, softness, water      bodies, prescribed motions, joints, contacts, walls and inflows
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
 tables                                       results that would be written to one place
+unit_slips                                   values for which most likely another unit was meant
 
 A check yields (key path, message) and changes nothing.  Imports `scene` and the chapters below it.
 """

@@ -23,6 +23,7 @@ from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.checks.softness import softness_remarks
 from coupler.checks.tables import table_problems
+from coupler.checks.unit_slips import unit_remarks
 from coupler.checks.water import water_problems, water_remarks
 from coupler.geometry.cell_sizes import has_equal_cells, places_in, widest_cell
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
@@ -33,14 +34,10 @@ from coupler.geometry.town import town_problems, town_remarks
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import Divisions
 
-LIGHTEST, HEAVIEST = 5.0, 25e3
-"""Densities [kg/m3] between which solids lie: foam and platinum."""
 FALLEN = 0.01
 """Share of its strength that a law may carry at the opening at failure without a remark."""
 SHAPES = {"size": "box", "diameter": "sphere"}
 """Shape of a block by the key that gives it, where the block needs a centre."""
-WEAKEST = 1.0
-"""Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
 
 
 def problems(case: Case) -> list[Problem]:
@@ -85,7 +82,7 @@ def remarks(case: Case) -> list[str]:
         *town_remarks(case),
     ]
     found += mesh_remarks(case.tank) if case.tank is not None else []
-    return [*found, *_unit_remarks(case), *_window_remarks(case)]
+    return [*found, *unit_remarks(case), *_window_remarks(case)]
 
 
 def thin_remarks(case: Case) -> Iterator[str]:
@@ -209,27 +206,6 @@ def _pass_remarks(case: Case) -> Iterator[str]:
             "can grow, and limits.energy_error may end the run; leave coupling.passes at 2, which is stable, or give "
             "a short time.step_max"
         )
-
-
-def _unit_remarks(case: Case) -> Iterator[str]:
-    """Implausible values, for which most likely another unit was meant."""
-    blocks = [block for part in parts_of(case) for block in part.blocks]
-    for block in blocks:
-        if not LIGHTEST <= block.density <= HEAVIEST:
-            yield f"the density of '{block.name}' is {block.density:g} kg/m3; other units are text, \"2.4 g/cm3\""
-            break
-    j = case.joints
-    if j is not None and j.strength < WEAKEST:
-        yield f'joints.strength is {j.strength:g} Pa, next to nothing; "1 MPa" is a million, "1 mPa" a thousandth'
-    if j is not None and blocks:
-        from coupler.geometry.bodies import Body
-
-        thinnest = min(Body.of_block(block).thickness() for block in blocks)
-        if j.opening_at_failure > 0.5 * thinnest:
-            yield (
-                f"joints.opening_at_failure is {j.opening_at_failure:g} m, more than half the thinnest block "
-                f'({thinnest:g} m); millimetres are text, "1 mm"'
-            )
 
 
 def _window_remarks(case: Case) -> Iterator[str]:

@@ -478,6 +478,39 @@ def test_a_law_that_does_not_exist_or_has_no_potential_is_refused():
             "joints.opening_at_failure is 1 m",
         ),
         (
+            structure({"centre": [7, 5, 2], "rotation": {"axis": [0, 0, 1], "angle": 90}}),
+            "structure.block[0].rotation.angle is 90 rad, more than a full turn; degrees are text",
+        ),
+        (
+            {
+                "solid": [
+                    {
+                        "name": "s",
+                        "centre": [7, 5, 3],
+                        "size": [1, 1, 1],
+                        "rotation": {"axis": [1, 0, 0], "angle": -45},
+                    }
+                ]
+            },
+            "solid[0].rotation.angle is -45 rad",
+        ),
+        (
+            {**structure({"centre": [7, 5, 0.5]}), "contact": {"stiffness": 1e6, "friction": 40}},
+            "contact.friction is 40, rougher than any dry faces; it is the tangential over the normal force, which for "
+            "an angle of 40 degrees is 0.84",
+        ),
+        (
+            {
+                **structure({"centre": [7, 5, 0.5]}),
+                "contact": {"stiffness": 1e6, "pair": [{"materials": ["block", "tank"], "friction": 35}]},
+            },
+            "contact.pair[0].friction is 35",
+        ),
+        (
+            {"water": {"density": 1, "fill": [{"lower": [0, 0, 0], "upper": [5, 10, 5]}]}},
+            'water.density is 1 kg/m3; other units are text, "1 t/m3"',
+        ),
+        (
             {"gauge": [{"kind": "pressure", "name": "g", "at": [1, 1, 1], "impulse": [2, 3]}]},
             "gauge 'g' begins to add up at 2 s",
         ),
@@ -487,3 +520,11 @@ def test_values_that_look_like_a_wrong_unit_are_reported(sections, says):
     """Allowed, since somebody may mean it: g/cm3 as a plain number, mPa for MPa, m for mm, a window after the end."""
     assert any(says in remark for remark in remarks(case(**sections)))
     assert reported(case(**sections)) == []
+
+
+def test_plausible_angles_friction_and_densities_are_not_remarked_on():
+    """A full turn, rubber on concrete, sea water."""
+    block = {"centre": [7, 5, 2], "rotation": {"axis": [0, 0, 1], "angle": "360 deg"}}
+    water = {"density": 1025, "fill": [{"lower": [0, 0, 0], "upper": [5, 10, 5]}]}
+    found = case(water=water, **structure(block) | {"contact": {"stiffness": 1e9, "friction": 1.2}})
+    assert remarks(found) == []
