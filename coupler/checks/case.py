@@ -80,9 +80,18 @@ def remarks(case: Case) -> list[str]:
         *_joint_remarks(case),
         *_loose_remarks(case),
         *town_remarks(case),
+        *_drawing_remarks(case),
     ]
     found += mesh_remarks(case.tank) if case.tank is not None else []
     return [*found, *unit_remarks(case), *_window_remarks(case)]
+
+
+def _drawing_remarks(case: Case) -> Iterator[str]:
+    """Those of drawings, whose modules are loaded only where there is one."""
+    if case.structure is not None and case.structure.drawing:
+        from coupler.geometry.drawing.drawing import drawing_remarks
+
+        yield from drawing_remarks(case)
 
 
 def thin_remarks(case: Case) -> Iterator[str]:

@@ -6,9 +6,12 @@ import time
 import meshio
 import numpy as np
 import pytest
+import trimesh
 from manifold3d import Manifold
 
+from coupler.case.case import Case
 from coupler.case.structure import BlockFile, Drawing
+from coupler.checks.case import remarks
 from coupler.commands.blocks.command import write_bodies
 from coupler.geometry.block_files import blocks_from_file
 from coupler.geometry.bodies import Body
@@ -168,6 +171,72 @@ def test_a_room_without_a_door_stays_hollow(tmp_path):
     check_whole(cut(write(tmp_path / "vault.stl", vault=body)), body)
     furnished = body + box((1, 1, 0.3), (1.5, 1.5, 1)).translate((0, 0, 0.5))
     check_whole(cut(write(tmp_path / "furnished.stl", vault=furnished)), furnished)
+
+
+def write_facing(path, *parts):
+    """One layer of boxes (lower, upper, whether it faces inwards)."""
+    found = [(*mesh(box(low, high)), inwards) for low, high, inwards in parts]
+    bodies = [trimesh.Trimesh(x, t[:, ::-1] if turn else t, process=False) for x, t, turn in found]
+    trimesh.util.concatenate(bodies).export(path)
+    return path
+
+
+ROOM = (((0, 0, 0), (3, 3, 3), False), ((0.5, 0.5, 0.5), (2.5, 2.5, 2.5), True))
+"""A vault of 27 - 8 m³."""
+
+
+@pytest.mark.parametrize(
+    ("parts", "volume", "turned"),
+    [
+        ((((0, 0, 0), (1, 1, 1), False), ((3, 0, 0), (4, 1, 1), True)), 2.0, 1),
+        ((*ROOM, ((1, 1, 0.5), (2, 2, 1.5), True)), 20.0, 1),
+        ((*ROOM, ((1, 1, 0.5), (2, 2, 1.5), False)), 20.0, 0),
+        ((*ROOM, ROOM[1]), 19.0, 0),
+    ],
+)
+def test_what_faces_inwards_and_is_no_room_is_a_body(tmp_path, parts, volume, turned):
+    """Beside another body and in a room it was left out without a word; a room that is drawn twice is one."""
+    found = cut(write_facing(tmp_path / "inwards.ply", *parts))
+    assert found.volume == pytest.approx(volume, rel=1e-6)
+    assert sum(b.volume for b in found.blocks) == pytest.approx(volume, rel=1e-6)
+    assert len(found.turned) == turned
+
+
+def test_in_the_opening_of_a_frame_a_wall_that_faces_inwards_stays(tmp_path):
+    """The box around the frame holds the wall, the frame does not."""
+    frame = box((0, 0, 0), (4, 0.4, 3)) - box((0.5, -1, 0), (3.5, 1, 2.5))
+    points, triangles = mesh(box((1, 0.1, 0), (3, 0.3, 1)))
+    both = [trimesh.Trimesh(*mesh(frame)), trimesh.Trimesh(points, triangles[:, ::-1])]
+    trimesh.util.concatenate(both).export(tmp_path / "portal.stl")
+    found = cut(tmp_path / "portal.stl", size=0.5)
+    assert found.volume == pytest.approx(frame.volume() + 0.4, rel=1e-6)
+    case = Case.model_validate(
+        {
+            "case": {"title": "portal"},
+            "time": {"end": 1.0},
+            "structure": {"drawing": [{"path": str(tmp_path / "portal.stl"), "size": 0.5}]},
+            "contact": {},
+        }
+    )
+    assert [text for text in remarks(case) if "drawing" in text] == [
+        "structure.drawing[0]: layer 'all': the surface around (2, 0.2, 0.5) m faces the other way than the others; it "
+        "lies within no other body and is taken for a body, not for a room: draw it facing outwards"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("parts", "text"),
+    [
+        ((*ROOM, ((1, 1, 0.4), (2, 2, 1.5), True)), r"around \(1.5, 1.5, 0.95\) m .* lies partly in a room"),
+        (
+            (((9, 0, 0), (19, 9, 9), False), *((low, high, not inwards) for low, high, inwards in ROOM)),
+            r"around \(1.5, 1.5, 1.5\) m .* holds another body",
+        ),
+    ],
+)
+def test_what_may_be_a_room_or_a_body_is_refused_with_its_place(tmp_path, parts, text):
+    with pytest.raises(BadDrawing, match=text):
+        cut(write_facing(tmp_path / "either.ply", *parts))
 
 
 def test_an_open_surface_is_refused_with_its_edges(tmp_path):

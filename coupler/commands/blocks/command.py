@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from coupler.case.case import Case
 from coupler.case.messages import explain_error
 from coupler.geometry.bodies import Body
-from coupler.geometry.drawing.drawing import Cut, cut_drawing, in_words
+from coupler.geometry.drawing.drawing import Cut, cut_drawing, in_words, turned_in_words
 from coupler.geometry.drawing.reading import BadDrawing
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
@@ -54,6 +54,8 @@ def blocks(path: Path, options: dict, joints: dict, picture: Path | None, to: Pa
         print(
             f"note: a part at {shown(place)} is {quantity(width, 'm')} wide; it shortens the substep (see sliver)"
         )
+    for text in turned_in_words(cut.turned):
+        print(f"note: {text}")
     if to is not None:
         write_bodies(to, cut)
         print(f"blocks: {to}")

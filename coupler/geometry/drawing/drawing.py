@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,14 +14,13 @@ from array_types import Array
 from coupler.geometry.drawing.convex_parts import CannotCut, Part, convex_parts, merged, smallest_width
 from coupler.geometry.drawing.division import divided, how_many
 from coupler.geometry.drawing.names import member_names
-from coupler.geometry.drawing.reading import BadDrawing, Layer, read_layers
+from coupler.geometry.drawing.reading import SAME_VOLUME, BadDrawing, Layer, read_layers
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.cuts import check_count
 from yade_scripts.blocks.polyhedra import BlockError, shown
 
 SLIVER = 0.25
 """Of the usual thickness of a layer: parts narrower than this are merged with a neighbour where that is convex."""
-SAME_VOLUME = 1e-9
 UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
 UNIT_TEXT = {"millimetres": "mm", "centimetres": "cm", "inches": "inch", "feet": "ft"}
 """Lengths of one unit [m] of drawings that are not in metres, and how a case writes them."""
@@ -32,13 +32,15 @@ GROUP = re.compile("[a-z]+")
 @dataclass(frozen=True)
 class Cut:
     """Result of cutting a drawing: blocks · extent (3,) [m] and volume [m³] drawn · layers: volume and number of blocks
-    by name · slivers: places (3,) [m] of the narrow parts that no neighbour could take, with their width [m]"""
+    by name · slivers: places (3,) [m] of the narrow parts that no neighbour could take, with their width [m] · turned:
+    names of layers and middles (3,) [m] of their bodies that face the other way than the others in the file"""
 
     blocks: tuple[Block, ...]
     extent: Array
     volume: float
     layers: dict[str, tuple[float, int]]
     slivers: tuple[tuple[Array, float], ...]
+    turned: tuple[tuple[str, Array], ...] = ()
 
 
 def blocks_from_drawing(spec, **common) -> list[Block]:
@@ -74,7 +76,31 @@ def cut_drawing(spec, **common) -> Cut:
     _check_volume(path, blocks, whole, tolerance, layers)
     counts = Counter(layer.name for layer, _, found in pieces for _ in found)
     given_values = {layer.name: (layer.body.volume(), counts[layer.name]) for layer in layers}
-    return Cut(tuple(blocks), extent, whole, given_values, tuple(slivers))
+    return Cut(tuple(blocks), extent, whole, given_values, tuple(slivers), _turned(layers))
+
+
+def drawing_remarks(case) -> Iterator[str]:
+    """Bodies of drawings that were turned, since they face the other way than the others."""
+    for i, spec in enumerate(case.structure.drawing if case.structure else ()):
+        layers, _ = read_layers(Path(spec.path), spec.scale, spec.offset, spec.up, spec.weld)
+        left_out = {rule.name for rule in spec.layer if rule.leave_out}
+        for text in turned_in_words(_turned([layer for layer in layers if layer.name not in left_out])):
+            yield f"structure.drawing[{i}]: {text}"
+
+
+def _turned(layers: list[Layer]) -> tuple[tuple[str, Array], ...]:
+    return tuple((layer.name, place) for layer in layers for place in layer.turned)
+
+
+def turned_in_words(turned) -> Iterator[str]:
+    """What to know about bodies that were turned, one line for each layer; turned: see Cut."""
+    for name in dict.fromkeys(name for name, _ in turned):
+        places = [place for layer, place in turned if layer == name]
+        more = f" and {len(places) - 1} more" if len(places) > 1 else ""
+        yield (
+            f"layer '{name}': the surface around {shown(places[0])}{more} faces the other way than the others; it lies "
+            "within no other body and is taken for a body, not for a room: draw it facing outwards"
+        )
 
 
 def _size(spec, rule) -> tuple[float, float]:

@@ -19,14 +19,18 @@ from yade_scripts.blocks.polyhedra import shown
 SURFACES = ("stl", "obj", "ply", "off", "glb", "gltf", "3mf")
 CAD = {"step": "cad", "stp": "cad", "iges": "cad", "igs": "cad", "brep": "cad", "ifc": "ifc"}
 """Endings that need an extra of their own, and which."""
+SAME_VOLUME = 1e-9
+"""Share by which volumes of one body may differ by round-off."""
 
 
 @dataclass(frozen=True)
 class Layer:
-    """name of a layer, object or material of the drawing · body: all that is drawn in it, as one manifold3d.Manifold"""
+    """name of a layer, object or material of the drawing · body: all that is drawn in it, as one manifold3d.Manifold ·
+    turned: middles (3,) [m] of bodies that face the other way than the others in the file, and were turned"""
 
     name: str
     body: object
+    turned: tuple[Array, ...] = ()
 
 
 class BadDrawing(MeshFileError):
@@ -60,11 +64,11 @@ def read_layers(
     tolerance = weld or max(1e-2 * WELD * float(np.median(edges)), 4.0 * digits)
     layers: list[Layer] = []
     for name, (points, triangles) in heaps.items():
-        body = _body(path, name, _rounded(points, tolerance, single), triangles, tolerance)
+        body, turned = _body(path, name, _rounded(points, tolerance, single), triangles, tolerance)
         for before in layers:
             body = body - before.body
         if not body.is_empty():
-            layers.append(Layer(name, body))
+            layers.append(Layer(name, body, turned))
     return layers, tolerance
 
 
@@ -159,14 +163,14 @@ def _plain(name: str, path: Path, taken) -> str:
 
 
 def _body(path: Path, name: str, points: Array, triangles: Array, tolerance: float):
-    """All that is drawn in a layer as one body.  Raises BadDrawing."""
+    """All that is drawn in a layer as one body, and the middles of those that were turned.  Raises BadDrawing."""
     points = welded(points, tolerance)
     unique, rows = np.unique(points, axis=0, return_inverse=True)
     triangles = rows.ravel()[triangles]
     triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
     whole = _manifold(unique, triangles)
     if whole is not None and whole.volume() > 0.0:
-        return _united(whole.decompose())
+        return _united(path, name, whole.decompose(), tolerance)
     try:
         surfaces = closed_surfaces(unique, list(triangles))
     except SurfaceError as error:
@@ -187,26 +191,85 @@ def _body(path: Path, name: str, points: Array, triangles: Array, tolerance: flo
                 unique[triangles],
                 _open_edges(surface.points, np.array(surface.loops)),
             )
-    return _united([body for _, body in bodies])
+    return _united(path, name, [body for _, body in bodies], tolerance)
 
 
-def _united(bodies):
-    """Bodies and cavities (those of negative volume) as one body: each cavity is taken out of the smallest body around
-    it, so that what stands inside a closed room stays."""
+def _united(path: Path, name: str, bodies, tolerance: float):
+    """Bodies and cavities (those of negative volume) as one body, and the middles of those that were turned.
+
+    Each cavity is taken out of the smallest body around it, so that what stands inside a closed room stays. What no
+    other body holds, or what stands in a room, is no cavity, though its faces point inwards: it is turned.
+    Raises BadDrawing where a surface may be either."""
     from manifold3d import Manifold, OpType
 
-    solids = [body for body in bodies if body.volume() > 0.0]
-    for hollow in (_turned(body) for body in bodies if body.volume() < 0.0):
-        around = [k for k, solid in enumerate(solids) if _holds(solid, hollow)]
-        for k in sorted(around, key=lambda k: solids[k].volume())[:1]:
-            solids[k] = solids[k] - hollow
-    return Manifold.batch_boolean(solids, OpType.Add)
+    whole = [body for body in bodies if body.volume() > 0.0]
+    solids, rooms, turned = list(whole), [], []
+    inwards = [_turned(body) for body in bodies if body.volume() < 0.0]
+    for inner in sorted(inwards, key=lambda body: -body.volume()):  # rooms come before what stands in them
+        around = [k for k, body in enumerate(whole) if _holds(body, inner, tolerance)]
+        k = min(around, key=lambda k: whole[k].volume(), default=None)
+        common = 0.0 if k is None else (solids[k] ^ inner).volume()
+        if any(_same(room, inner, tolerance) for room in rooms):
+            continue
+        if k is not None and _equal(common, inner, tolerance):
+            solids[k] = solids[k] - inner
+            rooms.append(inner)
+        elif common > _round_off(inner, tolerance) or any(_holds(inner, body, tolerance) for body in whole):
+            what = "lies partly in a room of another body" if around else "holds another body"
+            raise _inwards(path, name, inner, what)
+        else:
+            turned.append(inner)
+    found = sum(body.volume() for body in solids)
+    left = sum(body.volume() for body in whole) - sum(room.volume() for room in rooms)
+    if abs(found - left) > sum(_round_off(body, tolerance) for body in solids):
+        raise BadDrawing(
+            f"{path.name}: layer '{name}': its bodies without their cavities hold {left:.9g} m3, and {found:.9g} m3 "
+            "where the cavities are cut out; draw each body once and closed"
+        )
+    return Manifold.batch_boolean([*solids, *turned], OpType.Add), tuple(map(_middle, turned))
 
 
-def _holds(solid, inner) -> bool:
-    """Whether the box around a body holds that of another."""
+def _holds(solid, inner, tolerance: float) -> bool:
+    """Whether a body holds all of another one."""
     a, b = np.array(solid.bounding_box()), np.array(inner.bounding_box())
-    return bool((a[:3] <= b[:3]).all() and (a[3:] >= b[3:]).all() and solid.volume() > inner.volume())
+    boxed = (a[:3] <= b[:3] + tolerance).all() and (a[3:] >= b[3:] - tolerance).all()
+    return (
+        bool(boxed) and solid.volume() > inner.volume() and _equal((solid ^ inner).volume(), inner, tolerance)
+    )
+
+
+def _same(body, other, tolerance: float) -> bool:
+    """Whether two bodies fill the same place."""
+    return _equal(body.volume(), other, tolerance) and _equal((body ^ other).volume(), other, tolerance)
+
+
+def _equal(volume: float, body, tolerance: float) -> bool:
+    """Whether a volume [m³] is that of a body."""
+    return abs(volume - body.volume()) <= _round_off(body, tolerance)
+
+
+def _round_off(body, tolerance: float) -> float:
+    """Volume [m³] that does not count: of round-off, and of a skin as thick as points are apart that are one."""
+    return SAME_VOLUME * body.volume() + tolerance * body.surface_area()
+
+
+def _middle(body) -> Array:
+    """The middle (3,) [m] of the box around a body."""
+    return np.array(body.bounding_box()).reshape(2, 3).mean(axis=0)
+
+
+def _inwards(path: Path, name: str, body, what: str) -> BadDrawing:
+    """The refusal of a surface that may be a body or a room."""
+    from coupler.geometry.drawing.convex_parts import mesh_of
+
+    points, triangles = mesh_of(body)
+    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    return BadDrawing(
+        f"{path.name}: layer '{name}': the surface around {shown(_middle(body))} faces the other way than the others, "
+        f"as that of a room does, and {what}; turn its faces if it is a body, or draw the room within one body",
+        points[triangles],
+        points[edges],
+    )
 
 
 def _manifold(points: Array, triangles: Array):
