@@ -74,6 +74,7 @@ class NearBodies:
 @dataclass(frozen=True)
 class OnBed:
     """Cells up to a height [m] above a bed where the bed lies between two elevations: a shore, the ground of a town.
+    A cell counts if part of the bed under it lies between them, also where none of its nodes does.
 
     bed(x, y) → z [m] at (n,), (n,) [m] · lowest, highest [m] · height [m] · levels as above."""
 
@@ -87,15 +88,21 @@ class OnBed:
         """(M,) bool: cells of the mesh that are to have this level."""
         x = mesh.nodes
         z = np.asarray(self.bed(x[:, 0], x[:, 1]), float)
-        here = (z >= self.lowest) & (z <= self.highest) & (x[:, 2] - z <= self.height * (1.0 + TOUCH))
-        return here[mesh.cells].any(axis=1)
+        above = np.fmin.reduce((x[:, 2] - z)[mesh.cells], axis=1)
+        return self._reaches(z[mesh.cells]) & (above <= self.height * (1.0 + TOUCH))
 
     def volume_in(self, lower, upper) -> float:
         """Approximate volume [m³] of the region in the box from lower to upper."""
         x, y = np.meshgrid(*(np.linspace(lower[k], upper[k], SAMPLED) for k in range(2)))
-        z = np.asarray(self.bed(x.ravel(), y.ravel()), float)
-        share = ((z >= self.lowest) & (z <= self.highest)).mean()
+        z = np.asarray(self.bed(x.ravel(), y.ravel()), float).reshape(x.shape)
+        corners = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]], axis=-1)
+        share = self._reaches(corners.reshape(-1, 4)).mean()
         return float(share * self.height * (upper[0] - lower[0]) * (upper[1] - lower[1]))
+
+    def _reaches(self, z: Array) -> Array:
+        """(n,) bool: whether the bed between places of heights z (n, k) [m] reaches into the elevations; places
+        without ground are NaN and do not count."""
+        return (np.fmin.reduce(z, axis=1) <= self.highest) & (np.fmax.reduce(z, axis=1) >= self.lowest)
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,39 @@ def test_any_mesh_can_be_refined(tmp_path):
     assert shore.finest < 0.6 * 0.2
 
 
+@pytest.mark.parametrize("strip", [(0.05, 0.2), (0.1, 0.101), (-0.05, 0.05)])
+def test_a_strip_of_bed_between_two_columns_is_refined(strip):
+    """A shore may lie between two columns of nodes, 0.25 m apart in height here: nothing was refined there."""
+
+    def bed(x, y):
+        return -2.0 + 0.5 * x + 0.0 * y
+
+    fitted = fitted_mesh((0, 0, -2), (8, 2, 2), 0.5, bed)
+    strip_of_bed = OnBed(bed, *strip, 0.5, 2)
+    mesh = refined_mesh(fitted.mesh, [strip_of_bed], fitted.lattice)
+    z = np.linspace(*strip, 50)
+    x = 2.0 * (z + 2.0)
+    for height in (0.02, 0.45):
+        size = mesh.size_at(np.column_stack([x, np.full_like(x, 1.01), z + height]))
+        assert size.max() < 0.5 / 3.0
+    assert mesh.local_size.max() > 0.45
+    exact = 0.5 * 2.0 * 2.0 * (strip[1] - strip[0])  # as forecast from samples 4 cm apart
+    assert exact <= strip_of_bed.volume_in((0, 0, -2), (8, 2, 2)) <= exact + 0.5 * 2.0 * 2.5 * 8.0 / 199
+
+
+def test_places_without_ground_do_not_count_as_bed():
+    def bed(x, y):
+        return np.where(x < 4.1, -1.0 + 0.25 * x + 0.0 * y, np.nan)
+
+    coarse = box_mesh((0, 0, -1), (8, 1, 1), 0.5)
+    mesh = refined_mesh(coarse, [OnBed(bed, -0.2, 5.0, 0.5, 1)])
+    middle = mesh.nodes[mesh.cells].mean(axis=1)
+    fine = mesh.local_size < 0.3
+    assert middle[fine, 0].min() > 2.5
+    assert middle[fine, 0].max() < 5.0
+    assert OnBed(bed, -0.2, 5.0, 0.5, 1).volume_in((0, 0, -1), (8, 1, 1)) == pytest.approx(0.45, rel=0.1)
+
+
 def test_levels_that_cannot_be_are_refused():
     coarse = box_mesh((0, 0, 0), (1, 1, 1), 0.5)
     with pytest.raises(MeshError, match="from 1 to 8"):
