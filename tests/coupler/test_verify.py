@@ -91,6 +91,17 @@ def test_what_is_only_reported_is_not_counted_as_kept():
     assert "1 of 1 |" in page.page([reported, kept])
 
 
+@pytest.mark.parametrize("value", [0.15, math.nan])
+def test_what_is_only_reported_fails_no_case(value, monkeypatch):
+    """Whatever its value and the tolerance it was given."""
+    reported = Result.of("P43", Finding(f"rms of G1 {registry.TOLD}", value, 0.0, 0.1, False), 0.0)
+    kept = Result.of("P43", Finding("volume", 0.0, 0.0, 0.1, False), 0.0)
+    assert "1 of 1 cases pass, 1 of 1 figures" in report.totals([reported, kept])
+    assert "1 of 1 cases pass, and 1 of 1 quantities" in page.page([reported, kept])
+    monkeypatch.setattr(report, "run", lambda case, plots: [reported, kept])
+    assert report.verify(["p43"], quick=False, as_json=False, only_list=False) == ExitCode.DONE
+
+
 def test_a_failure_is_counted_and_named():
     good = Result.of("P01", Finding("a", 1.0, 1.0, 0.1), 1.0)
     bad = Result.of("P02", Finding("b", 2.0, 1.0, 0.1), 2.0)

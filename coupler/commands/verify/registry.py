@@ -79,6 +79,11 @@ class Result:
         """Whether the result is judged: one that is only reported neither passes nor fails."""
         return TOLD not in self.quantity
 
+    @property
+    def missed(self) -> bool:
+        """Whether the result is judged and not within its limit."""
+        return self.judged and not self.passed
+
     @classmethod
     def of(cls, id: str, found: Finding, cpu_s: float) -> Result:
         """The result of comparing a finding with its tolerance; NaN does not pass."""

@@ -39,7 +39,7 @@ def verify(
         print(totals(results))
     if plots is not None:
         draw(plots, [case.id for case in cases])
-    return ExitCode.DONE if all(r.passed for r in results) else ExitCode.DIVERGED
+    return ExitCode.DONE if not any(r.missed for r in results) else ExitCode.DIVERGED
 
 
 def draw(plots: Path, ids: list[str]) -> None:
@@ -73,7 +73,7 @@ def json_line(result: Result) -> str:
 
 def totals(results: list[Result]) -> str:
     """How many passed, which did not, and the processor time."""
-    failed = sorted({r.id for r in results if not r.passed})
+    failed = sorted({r.id for r in results if r.missed})
     cases = len({r.id for r in results})
     judged = [r for r in results if r.judged]
     summary = f"{cases - len(failed)} of {cases} cases pass, {sum(r.passed for r in judged)} of {len(judged)} figures"

@@ -6,7 +6,7 @@ import numpy as np
 
 from coupler.commands.verify.curves import Curve, Figure, Panel
 from coupler.commands.verify.figures import columns
-from coupler.commands.verify.registry import Finding, check
+from coupler.commands.verify.registry import TOLD, Finding, check
 from coupler.commands.verify.scenes import graded
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
@@ -167,7 +167,7 @@ def cylinder():
     drag, lift, difference = _cylinder(0.005, 3.0)
     yield Finding("drag coefficient, D/20", drag, 5.57953523384, 0.05)
     yield Finding("pressure difference [Pa]", difference, 0.11752016697, 0.05)
-    yield Finding("lift coefficient (reported, not judged)", lift, 0.010618948146, 0.1, False)
+    yield Finding(f"lift coefficient {TOLD}", lift, 0.010618948146, np.inf, False)
 
 
 def _cylinder(h: float, end: float) -> tuple[float, float, float]:
