@@ -16,7 +16,7 @@ from coupler.checks.read_case import load
 from coupler.commands.stress.drawn import command
 from coupler.commands.stress.drawn import trial as trials
 from coupler.commands.stress.drawn.case import write
-from coupler.commands.stress.drawn.judge import measures
+from coupler.commands.stress.drawn.judge import _finite, measures
 from coupler.commands.stress.drawn.scene import draw
 from coupler.commands.stress.drawn.shrink import shrunk
 from coupler.commands.stress.drawn.trial import Trial, asked_too_much
@@ -24,6 +24,7 @@ from coupler.commands.stress.registry import Measure
 from coupler.geometry.overlaps import Overlap
 from coupler.program.errors import BadCase, ExitCode
 from coupler.results.fields import BlockWriter
+from coupler.results.gauges import make_gauge
 from coupler.results.history import HistoryTable, read_history
 from coupler.run.directory import RunDirectory, write_json
 from coupler.run.execute import execute_case
@@ -194,6 +195,33 @@ def test_files_of_a_sound_run_keep_everything(tmp_path):
 )
 def test_a_fault_is_seen_in_the_files(tmp_path, what, wrong):
     assert wrong in written(tmp_path / "run", **what)
+
+
+GAUGES = (
+    {"kind": "air", "name": "a", "at": (1, 1, 1)},
+    {"kind": "pressure", "name": "p", "at": (1, 1, 1), "impulse": (0, 1), "mean_over": 0.1},
+    {"kind": "patch", "name": "s", "at": (1, 1, 1), "radius": 0.1, "normal": (1, 0, 0), "mean_over": 0.1},
+    {"kind": "velocity", "name": "v", "at": (1, 1, 1), "mean_over": 0.1},
+    {"kind": "level", "name": "l", "at": (1, 1), "mean_over": 0.1},
+    {"kind": "flux", "name": "f", "at": (1, 1, 1), "edges": ((0, 1, 0), (0, 0, 1)), "mean_over": 0.1},
+    {"kind": "motion", "name": "m", "of": "a"},
+)
+
+
+@pytest.mark.parametrize("gauge", GAUGES, ids=lambda gauge: gauge["kind"])
+def test_cells_of_gauges_may_be_empty_exactly_where_there_is_nothing_to_measure(gauge):
+    """The gauge itself writes NaN as an empty cell in those columns, whose names come from it."""
+    case = Case.model_validate(BLOCKS | {"gauge": [gauge]})
+    names = [name for name, *_ in make_gauge(case.gauge[0], {"a": np.array([0])}).columns]
+    always = ("covered", "impulse", "peak")
+    if gauge["kind"] in ("level", "flux", "motion"):
+        always = tuple(names)
+    counted = {}
+    for name in names:
+        tables = {"gauges": {name: np.array([1.0, np.nan])}}
+        (found,) = _finite(tables, case)
+        counted[name] = found.value
+    assert counted == {name: float(name.endswith(always)) for name in names}
 
 
 def test_a_block_that_left_through_an_open_side_is_not_looked_for(tmp_path):

@@ -33,6 +33,16 @@ LOOKED_AT = 4
 HELD_STILL = 1e-6
 """Shares of their size by which bodies may have moved that count as held: two of them overlap as they were drawn."""
 
+EMPTY = {
+    "air": ("pressure", "volume"),
+    "pressure": ("pressure", "mean"),
+    "patch": ("pressure", "mean"),
+    "velocity": tuple(f"velocity_{what}" for what in ("x", "y", "z", "mean_x", "mean_y", "mean_z")),
+}
+"""Columns of gauges, by their kind, whose cells are empty while there is nothing to measure: at a place inside a block
+or solid, or without a pocket of air. Over dry ground the depth of water is 0, as is the flow through a covered patch.
+"""
+
 
 def measures(directory: Path, still: bool) -> Iterator[Measure]:
     """All figures of a run directory, of a run that ended or stopped at its budget; still: the water should
@@ -53,15 +63,14 @@ def measures(directory: Path, still: bool) -> Iterator[Measure]:
 
 
 def _finite(tables: dict, case: Case) -> Iterator[Measure]:
-    """The number of values in all histories that are not finite; cells of a gauge without an air pocket may be
-    empty."""
-    air = [gauge.name for gauge in case.gauge if gauge.kind == "air"]
-    empty = {f"{name}_{what}" for name in air for what in ("pressure", "volume")}
+    """The number of values in all histories that are not finite; cells of gauges that may find nothing to measure may
+    be empty."""
+    empty = {f"{gauge.name}_{what}" for gauge in case.gauge for what in EMPTY.get(gauge.kind, ())}
     wrong = sum(
         int((~np.isfinite(values)).sum())
-        for table in tables.values()
+        for title, table in tables.items()
         for name, values in table.items()
-        if values.dtype.kind == "f" and name not in empty
+        if values.dtype.kind == "f" and not (title == "gauges" and name in empty)
     )
     yield Measure("numbers that are not finite", float(wrong), 0.0)
 
