@@ -66,7 +66,10 @@ class Varied(Section):
     lower: Amount | None = Field(None, description="the distribution is cut off below; absent: it is not")
     upper: Amount | None = Field(None, description="the distribution is cut off above; absent: it is not")
     whole: Switch = Field(
-        False, description="true: samples and values of a grid are rounded to whole numbers"
+        False,
+        description="true: whole numbers alone. Those of uniform, from low to high, are equally likely; samples of "
+        "other distributions and values of a grid are rounded to the nearest, so that one at which a distribution is "
+        "cut off has the samples of one side alone",
     )
 
     @model_validator(mode="after")

@@ -227,6 +227,35 @@ def test_every_run_has_seeds_of_its_own_and_always_the_same(case):
     assert point[:8] != point[8:]  # samples of another point are others
 
 
+@pytest.mark.parametrize(
+    ("ends", "wanted"),
+    [
+        ("low = 1\nhigh = 6", range(1, 7)),
+        ("low = 0.5\nhigh = 6.5", range(1, 7)),
+        ("low = 1\nhigh = 60\nlower = 4\nupper = 6.2", range(4, 7)),
+        ("low = -2\nhigh = 3", range(-2, 4)),
+    ],
+)
+def test_whole_numbers_of_a_uniform_distribution_are_equally_likely(case, ends, wanted):
+    """Exactly so with a Latin hypercube; rounded, the numbers at both ends had half as many samples."""
+    plan = make_plan(
+        case(
+            f'[sweep]\nsamples = 60\n[[sweep.vary]]\nname = "n"\ndistribution = "uniform"\nwhole = true\n{ends}\n'
+        )
+    )
+    drawn, count = np.unique(values(plan, "n"), return_counts=True)
+    assert drawn.tolist() == list(wanted)
+    assert (count == 60 // len(wanted)).all()
+
+
+def test_a_uniform_distribution_without_a_whole_number_is_refused(case):
+    sweep = (
+        '[sweep]\n[[sweep.vary]]\nname = "n"\ndistribution = "uniform"\nwhole = true\nlow = 1.2\nhigh = 1.8\n'
+    )
+    with pytest.raises(BadCase, match=r"sweep.vary n: there is no whole number from 1.2 to 1.8"):
+        make_plan(case(sweep))
+
+
 def test_the_free_field_is_made_once_for_all_that_differ_in_the_structure(case):
     plan = make_plan(
         case(

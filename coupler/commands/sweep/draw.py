@@ -6,6 +6,7 @@ lognormal    median exp(dispersion Phi^-1(u));  of mean m and variation c: dispe
 weibull      scale (-ln(1 - u))^(1/shape);      of mean m and variation c: shape from
              c² = Γ(1 + 2/k)/Γ(1 + 1/k)² - 1,  scale = m/Γ(1 + 1/k)
 cut off      F^-1(F(lower) + u (F(upper) - F(lower)))
+whole        uniform: each whole number from low to high has the same probability; others are rounded
 """
 
 from __future__ import annotations
@@ -91,6 +92,20 @@ def distribution(kind: str, given: dict[str, float]):
         scale = given["mean"] / np.exp(gammaln(1.0 + 1.0 / shape))
     _positive("scale", scale)
     return stats.weibull_min(shape, scale=scale)
+
+
+def whole_numbers(given: dict[str, float], lower: float | None, upper: float | None):
+    """The frozen distribution of scipy in which every whole number of a uniform one, cut off at lower and upper, is
+    equally likely. Raises ValueError where there is none."""
+    ends = (
+        max(given["low"], -np.inf if lower is None else lower),
+        min(given["high"], np.inf if upper is None else upper),
+    )
+    low, high = (float(f"{end:.12g}") for end in ends)  # 600 cm are 6 m
+    first, last = int(np.ceil(low)), int(np.floor(high))
+    if first > last:
+        raise ValueError(f"there is no whole number from {low:g} to {high:g}")
+    return stats.randint(first, last + 1)
 
 
 def weibull_shape(variation: float) -> float:

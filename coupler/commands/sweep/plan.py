@@ -24,7 +24,7 @@ from coupler.case.toml_lines import shown
 from coupler.case.toml_text import inline
 from coupler.checks.read_case import CaseFile, load, parse_path
 from coupler.commands.study.plan import fingerprint
-from coupler.commands.sweep.draw import cube, distribution, quantiles, seed_of
+from coupler.commands.sweep.draw import cube, distribution, quantiles, seed_of, whole_numbers
 from coupler.commands.sweep.quantities import asked
 from coupler.commands.sweep.table_in import InputTable, read_table
 from coupler.commands.sweep.vary import varied
@@ -223,6 +223,8 @@ class _Planner:
             try:
                 frozen = distribution(v.distribution, given)
                 quantiles(frozen, np.array([0.5]), *cuts)
+                if v.whole and v.distribution == "uniform":
+                    frozen, cuts = whole_numbers(given, *cuts), [None, None]
             except ValueError as error:
                 raise BadCase([f"{self.file.path}: sweep.vary {v.column}: {error}"]) from error
             found.append((frozen, *cuts))
