@@ -61,12 +61,19 @@ def taken(entry: dict, run: Path) -> tuple[float, str]:
     columns, reason = _columns(entry, run)
     if reason:
         return float("nan"), reason
-    time, values = columns["time"], columns[entry["column"]]
-    reason = _beyond(time, entry)
+    return reduced(columns["time"], columns[entry["column"]], entry)
+
+
+def reduced(time: Array, values: Array, entry: dict) -> tuple[float, str]:
+    """What an entry takes from a history (n,); NaN with the reason where that has not all of what it is about."""
+    window = (entry["from"], entry["to"]) if "from" in entry else None
+    reason = _without(time, entry["time"]) if entry["take"] == "at" else ""
+    if window is not None:
+        reason = lacking(time, *window) or reason
     if reason:
-        return float("nan"), reason
-    if "from" in entry:
-        time, values = _window(time, values, *_recorded(time, entry))
+        return float("nan"), f"the run has nothing {reason}"
+    if window is not None:
+        time, values = windowed(time, values, *window)
     return float(TAKE[entry["take"]](time, values, entry)), ""
 
 
@@ -81,38 +88,45 @@ def _columns(entry: dict, run: Path) -> tuple[dict, str]:
     return columns, "" if len(columns["time"]) else f"{table} has no rows"
 
 
-def _beyond(time: Array, entry: dict) -> str:
-    """Why an entry is about times of which a history (n,) [s] has no rows; empty if it has them all. The first row is
-    that after the first step of the run, and the last one may lie an interval inside."""
+def lacking(time: Array, start: float, end: float) -> str:
+    """The part "from ... to ... s" of a window of which a history (n,) [s] has no rows; empty if it has them all."""
+    low, high = _covered(time)
+    first, last = _recorded(time, start, end)
+    if not first < last:
+        return f"from {start:g} to {end:g} s"
+    if start < low:
+        return f"from {start:g} to {first:g} s"
+    return f"from {last:g} to {end:g} s" if end > high else ""
+
+
+def _without(time: Array, at: float) -> str:
+    """Why a history (n,) [s] has no value at a time; empty if it has one."""
+    low, high = _covered(time)
+    return "" if low <= at <= high else f"at {at:g} s, only from {time[0]:g} to {time[-1]:g} s"
+
+
+def _covered(time: Array) -> tuple[float, float]:
+    """Begin and end [s] of what a history tells. The first row of a run is that after its first step, and the last one
+    may lie an interval inside."""
     slack = float(np.diff(time).max(initial=0.0))
-    low, high = min(0.0, time[0] - slack), time[-1] + slack
-    if "from" in entry:
-        start, end = _recorded(time, entry)
-        if not start < end:
-            return f"the run has nothing from {entry['from']:g} to {entry['to']:g} s"
-        if entry["from"] < low:
-            return f"the run has nothing from {entry['from']:g} to {start:g} s"
-        if entry["to"] > high:
-            return f"the run has nothing from {end:g} to {entry['to']:g} s"
-    if entry["take"] == "at" and not low <= entry["time"] <= high:
-        return f"the run has nothing at {entry['time']:g} s, only from {time[0]:g} to {time[-1]:g} s"
-    return ""
+    return min(0.0, time[0] - slack), time[-1] + slack
 
 
-def _recorded(time: Array, entry: dict) -> tuple[float, float]:
+def _recorded(time: Array, start: float, end: float) -> tuple[float, float]:
     """Begin and end [s] of the part of a window that a history has."""
-    return max(entry["from"], time[0]), min(entry["to"], time[-1])
+    return max(start, time[0]), min(end, time[-1])
 
 
-def _window(time: Array, values: Array, start: float, end: float) -> tuple[Array, Array]:
-    """The part of a history from start to end [s], with its values there."""
+def windowed(time: Array, values: Array, start: float, end: float) -> tuple[Array, Array]:
+    """The part of a history from start to end [s] that was recorded, with its values there."""
+    start, end = _recorded(time, start, end)
     grid = np.unique(np.concatenate([[start, end], time]))
     grid = grid[(grid >= start) & (grid <= end)]
     return grid, np.interp(grid, time, values)
 
 
 def _integral(time: Array, values: Array, entry: dict) -> float:
-    grid, part = _window(time, values, *_recorded(time, entry))
+    grid, part = windowed(time, values, entry["from"], entry["to"])
     return np.trapezoid(part, grid)
 
 

@@ -94,6 +94,30 @@ def test_the_cheapest_setting_is_found_and_what_a_part_costs(fake, case):
     assert part["share"] == pytest.approx(0.25 / 10.25)
 
 
+def test_a_window_that_the_runs_did_not_reach_gives_no_error_but_the_reason(fake, case):
+    """In study.json, study.csv and on the page; the other quantities of the runs are as they were."""
+    text = (
+        (case / "case.toml")
+        .read_text()
+        .replace('against = "measured"', 'window = [20, 30]\nagainst = "measured"')
+    )
+    (case / "case.toml").write_text(
+        text.replace('take = "mean"', 'take = "mean"\nwindow = [0, 30]'), encoding="utf-8"
+    )
+    code, reported = made(case, repeat=2)
+    assert code == ExitCode.DONE
+    point = reported["points"][0]["readings"]
+    assert (point["measured"]["value"], point["measured"]["error"]) == (None, None)
+    assert point["measured"]["why"] == "the run has nothing from 20 to 30 s"
+    assert point["finest"]["why"].startswith("the run has nothing from ")
+    assert point["exact"]["error"] == pytest.approx(0.16)
+    assert all(run["same"] for run in reported["runs"].values())
+    assert "measured: the run has nothing from 20 to 30 s" in (case / "out" / "study.md").read_text(
+        encoding="utf-8"
+    )
+    assert "the run has nothing from 20 to 30 s" in (case / "out" / "study.csv").read_text(encoding="utf-8")
+
+
 def test_the_same_setting_is_run_once(fake, case):
     """dt = 0.1 and rule = exact are the case as it stands."""
     made(case)

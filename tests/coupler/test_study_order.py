@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from coupler.case.study import Quantity
 from coupler.commands.study.order import last_slope, slope, three_run_order
-from coupler.commands.study.reading import Curve, taken
+from coupler.commands.study.reading import Curve, NotRecorded, taken
 from coupler.commands.study.reference import against_curve
 
 ORDERS = st.floats(0.3, 5.0)
@@ -58,15 +58,44 @@ def test_reductions_count_within_their_window_alone():
     assert np.isnan(taken(quantity(take="arrival", above=60.0), ramp))
 
 
+LATE = [("max", {}), ("min", {}), ("mean", {}), ("last", {}), ("integral", {}), ("arrival", {"above": 1.0})]
+
+
+@pytest.mark.parametrize(("take", "given"), LATE)
+@pytest.mark.parametrize(
+    ("window", "missing"),
+    [((20.0, 30.0), "from 20 to 30 s"), ((5.0, 12.0), "from 10 to 12 s"), ((4.5, 11.0), "")],
+)
+def test_a_window_that_a_run_did_not_reach_has_no_number(take, given, window, missing):
+    """Rows are a second apart: a window may end that much later, as of `[[expect]]`."""
+    ramp = Curve(np.arange(11.0), np.arange(11.0))
+    q = quantity(take=take, window=window, **given)
+    if missing:
+        with pytest.raises(NotRecorded, match=f"the run has nothing {missing}"):
+            taken(q, ramp)
+    else:
+        assert np.isfinite(taken(q, ramp))
+
+
+def test_a_time_that_a_run_did_not_reach_has_no_number():
+    with pytest.raises(NotRecorded, match="the run has nothing at 12 s, only from 0 to 10 s"):
+        taken(quantity(take="at", time=12.0), Curve(np.arange(11.0), np.arange(11.0)))
+
+
+def measured(folder, **given):
+    """A quantity against the curve of the file ref.csv."""
+    return Quantity.model_validate(
+        {"name": "q", "table": "t", "column": "c", "take": "curve", "against": "measured", "columns": ("t", "v"),
+         "path": str(folder / "ref.csv"), "band_columns": ("low", "high")} | given
+    )  # fmt: skip
+
+
 def test_the_distance_of_two_curves_is_their_root_mean_square(tmp_path):
     """2 against 1.9 is off by 5 %, whatever the times of the samples; the scatter 1.7 to 2.3 is 15 % wide a side."""
     (tmp_path / "ref.csv").write_text(
         "# who\nt,v,low,high\n0,2,1.7,2.3\n1,2,1.7,2.3\n3,2,1.7,2.3\n9,2,1.7,2.3\n"
     )
-    q = Quantity.model_validate(
-        {"name": "q", "table": "t", "column": "c", "take": "curve", "against": "measured", "columns": ("t", "v"),
-         "path": str(tmp_path / "ref.csv"), "band_columns": ("low", "high")}
-    )  # fmt: skip
+    q = measured(tmp_path)
     found = against_curve(q, Curve(np.linspace(0.0, 4.0, 50), np.full(50, 1.9)))
     assert found.value == pytest.approx(0.1)
     assert found.error == pytest.approx(0.05)

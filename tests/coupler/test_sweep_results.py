@@ -255,6 +255,16 @@ def test_runs_that_cannot_stand_are_in_the_state_and_failed_ones_are_unknown(mad
     assert len(runs.x) == 47
 
 
+def test_a_run_that_failed_before_the_window_of_a_quantity_is_in_no_state(made):
+    """The history ends at 1 s: a window beyond it held the last value on, which is above the limit of the state."""
+    late = SWEEP.replace('take = "max"', 'take = "max"\nwindow = [2, 3]', 1)
+    spec, _ = made(sweep=late, ends={48: ("diverged", ExitCode.DIVERGED, "energy")})
+    results = collect(spec)
+    assert np.isnan(results.column("peak")).all()
+    assert results.column("reason")[0] == "peak: the run has nothing from 2 to 3 s"
+    assert read_runs(results, spec.sweep.fragility[0]).unknown == 48
+
+
 def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
     """Deterministic runs are separable: the dispersion of a fit would be that of nothing."""
     alike = SWEEP.replace(

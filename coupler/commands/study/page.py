@@ -36,6 +36,9 @@ def page(study: dict, level: int = 1, pictures: str = "") -> str:
     failed = _failed(study)
     if failed:
         parts.append(f"{mark}# Runs that failed\n\n{failed}")
+    missing = _missing(study)
+    if missing:
+        parts.append(f"{mark}# Figures that runs do not have\n\n{missing}")
     return "\n\n".join(parts) + "\n"
 
 
@@ -211,4 +214,15 @@ def _parts(study: dict) -> str:
 
 def _failed(study: dict) -> str:
     lines = [f"- {point_name(point)}: {point['reason']}" for point in study["points"] if point["reason"]]
+    return "\n".join(dict.fromkeys(lines))
+
+
+def _missing(study: dict) -> str:
+    """The figures that runs which reached their end do not have, with the reason."""
+    lines = [
+        f"- {point_name(point)}: {name}: {reading['why']}"
+        for point in study["points"]
+        for name, reading in point["readings"].items()
+        if reading.get("why")
+    ]
     return "\n".join(dict.fromkeys(lines))

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from array_types import Array
 from coupler.case.study import Quantity
-from coupler.program.errors import BadCase, did_you_mean
-from coupler.results.expected import TAKE
+from coupler.program.errors import BadCase, SurgebreakError, did_you_mean
+from coupler.results.expected import lacking, reduced, windowed
 from coupler.results.history import read_history
 from coupler.run.summary import read_summary
+
+
+class NotRecorded(SurgebreakError):
+    """A curve does not have all of the time that a quantity is about; the message says what is missing."""
 
 
 @dataclass(frozen=True)
@@ -23,13 +25,12 @@ class Curve:
     values: Array
 
     def within(self, window: tuple[float, float] | None) -> Curve:
-        """The part between two times, including its ends; the whole curve without a window."""
+        """The part between two times, including its ends; the whole curve without a window. Raises NotRecorded."""
         if window is None:
             return self
-        low, high = max(window[0], self.time[0]), min(window[1], self.time[-1])
-        inner = (self.time > low) & (self.time < high)
-        time = np.concatenate([[low], self.time[inner], [high]])
-        return Curve(time, np.interp(time, self.time, self.values))
+        if missing := lacking(self.time, *window):
+            raise NotRecorded(f"there is nothing {missing}")
+        return Curve(*windowed(self.time, self.values, *window))
 
 
 def curve(run: Path, q: Quantity, place: str) -> Curve:
@@ -54,16 +55,19 @@ def _there(names: list[str]) -> str:
 
 
 def taken(q: Quantity, found: Curve) -> float:
-    """The reduction of a curve to a number; NaN where it has none (no second swing, a value never passed)."""
-    entry = {"time": q.time, "above": q.above}
-    part = found.within(q.window)
+    """The reduction of a curve to a number; NaN where it has none (no second swing, a value never passed). Raises
+    NotRecorded."""
+    entry = {"take": q.take, "time": q.time, "above": q.above}
     if q.window is not None:
-        entry |= {"from": part.time[0], "to": part.time[-1]}
-    return float(TAKE[q.take](part.time, part.values, entry))
+        entry |= {"from": q.window[0], "to": q.window[1]}
+    value, reason = reduced(found.time, found.values, entry)
+    if reason:
+        raise NotRecorded(reason)
+    return value
 
 
 def read(run: Path, q: Quantity, place: str) -> float:
-    """The number of a quantity in a run, for any take but `curve`. Raises BadCase."""
+    """The number of a quantity in a run, for any take but `curve`. Raises BadCase, NotRecorded."""
     return _figure(run, q, place) if q.figure is not None else taken(q, curve(run, q, place))
 
 

@@ -11,18 +11,20 @@ from coupler.case.formula import evaluate
 from coupler.case.records import column as table_column
 from coupler.case.records import read_record
 from coupler.case.study import Quantity
-from coupler.commands.study.reading import Curve, taken
+from coupler.commands.study.reading import Curve, NotRecorded, taken
 from coupler.program.errors import BadCase
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A quantity in one run: value, what it was compared with, error (a share), band (a share; 0 without)."""
+    """A quantity in one run: value, what it was compared with, error (a share), band (a share; 0 without); why there is
+    no value (NaN)."""
 
     value: float
     reference: float
     error: float
     band: float = 0.0
+    why: str = ""
 
 
 def against_number(q: Quantity, value: float, reference: float, place: str) -> Reading:
@@ -41,9 +43,9 @@ def against_number(q: Quantity, value: float, reference: float, place: str) -> R
 def against_curve(q: Quantity, found: Curve) -> Reading:
     """Root mean square distance from the reference curve, over its root mean square (or the scale).
 
-    Both are compared at the times of the reference that lie in the window and in the run.
+    Both are compared at the times of the reference that lie in the window and in the run. Raises NotRecorded.
     """
-    reference = file_curve(q).within(q.window)
+    reference = _part_of_file(q)
     inside = (reference.time >= found.time[0]) & (reference.time <= found.time[-1])
     time, values = reference.time[inside], reference.values[inside]
     difference = rms(time, np.interp(time, found.time, found.values) - values)
@@ -52,9 +54,18 @@ def against_curve(q: Quantity, found: Curve) -> Reading:
     if q.band is not None:
         band = q.band / scale
     elif q.band_columns is not None:
-        low, high = (file_curve(q, name).within(q.window) for name in q.band_columns)
+        low, high = (_part_of_file(q, name) for name in q.band_columns)
         band = rms(low.time, 0.5 * (high.values - low.values)) / scale
     return Reading(difference, 0.0, difference / scale, band)
+
+
+def _part_of_file(q: Quantity, column: str | None = None) -> Curve:
+    """The part of a reference curve in the window. Raises NotRecorded."""
+    whole = file_curve(q, column)
+    try:
+        return whole.within(q.window)
+    except NotRecorded as error:
+        raise NotRecorded(f"{q.path}: {error}") from error
 
 
 def rms(time, values) -> float:
@@ -64,14 +75,22 @@ def rms(time, values) -> float:
 
 def fixed_reference(q: Quantity, case: dict) -> float:
     """The exact or measured number of a quantity, for a run with this effective case."""
-    return evaluate(q.value, case) if q.value is not None else taken(q, file_curve(q))
+    return evaluate(q.value, case) if q.value is not None else _of_file(q)
+
+
+def _of_file(q: Quantity, column: str | None = None) -> float:
+    """What the quantity takes from the reference file. Raises NotRecorded."""
+    try:
+        return taken(q, file_curve(q, column))
+    except NotRecorded as error:
+        raise NotRecorded(f"{q.path}: {str(error).replace('the run has', 'there is')}") from error
 
 
 def half_band(q: Quantity) -> float:
     """Half the scatter of a measured number; for two curves, of the numbers that are taken from them."""
     if q.band is not None:
         return abs(q.band)
-    low, high = (taken(q, file_curve(q, name)) for name in q.band_columns)
+    low, high = (_of_file(q, name) for name in q.band_columns)
     return 0.5 * abs(high - low)
 
 

@@ -103,7 +103,11 @@ def write(folder: Path, study: dict) -> None:
 
 def _csv(point: dict, q: dict, run: dict, name: str) -> str:
     reading = point["readings"].get(q["name"], {})
-    own = {"quantity": q["name"], "against": q["against"], "failed": point["reason"]} | reading
+    own = {
+        "quantity": q["name"],
+        "against": q["against"],
+        "failed": point["reason"] or reading.get("why", ""),
+    } | reading
     value = next((place[name] for place in (own, point, run, run["size"]) if name in place), "")
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""

@@ -9,7 +9,7 @@ import numpy as np
 from coupler.case.study import Quantity
 from coupler.commands.study.order import last_slope, slope, three_run_order
 from coupler.commands.study.plan import Plan, Rung
-from coupler.commands.study.reading import curve, read
+from coupler.commands.study.reading import NotRecorded, curve, read
 from coupler.commands.study.reference import Reading, against_curve, against_number, fixed_reference
 from coupler.commands.study.runner import Measured, Runs
 from coupler.program.errors import BadCase
@@ -53,14 +53,19 @@ def collect(plan: Plan, runs: Runs, repeat: int) -> dict[str, Outcome]:
         same = best.failed or all(_values(plan, runs, m) == _values(plan, runs, best) for m in made)
         found[setting.id] = Outcome(best, tuple(m.cpu_seconds for m in made), readings, same)
         what = best.reason or f"{best.steps} steps, {best.cpu_seconds:.3g} CPU s"
+        what = "; ".join([what, *(f"{name}: {r.why}" for name, r in readings.items() if r.why)])
         runs.tell(f"{count}/{len(needed)}  {_named(plan, setting.id)}: {what}")
     return _against_finest(plan, found)
 
 
-def _values(plan: Plan, runs: Runs, run: Measured) -> dict[str, float]:
+def _values(plan: Plan, runs: Runs, run: Measured) -> dict[str, float | None]:
+    """Of every quantity of a run; None where there is none, which equals itself as NaN does not."""
     if run.failed:
         return {}
-    return {name: reading.value for name, reading in _readings(plan, runs, run).items()}
+    return {
+        name: None if np.isnan(reading.value) else reading.value
+        for name, reading in _readings(plan, runs, run).items()
+    }
 
 
 def _named(plan: Plan, setting: str) -> str:
@@ -84,6 +89,8 @@ def _readings(plan: Plan, runs: Runs, run: Measured) -> dict[str, Reading]:
     for i, q in enumerate(plan.study.quantity):
         try:
             found[q.name] = _reading(q, place, setting.case, f"{plan.file.path}: study.quantity[{i}]")
+        except NotRecorded as error:
+            found[q.name] = Reading(np.nan, np.nan, np.nan, why=str(error))
         except BadCase:
             if not optional:
                 raise
@@ -112,14 +119,22 @@ def _against_finest(plan: Plan, found: dict[str, Outcome]) -> dict[str, Outcome]
         rung = finest(plan, q) if q.against == "finest" else None
         if rung is None or q.name not in found[rung.setting].readings:
             continue
-        reference = found[rung.setting].readings[q.name].value
+        finest_one = found[rung.setting].readings[q.name]
         place = f"{plan.file.path}: study.quantity[{i}]"
         for id, outcome in found.items():
             if id != rung.setting and q.name in outcome.readings:
-                value = outcome.readings[q.name].value
-                readings = outcome.readings | {q.name: against_number(q, value, reference, place)}
-                found[id] = replace(outcome, readings=readings)
+                own = _against(q, outcome.readings[q.name], finest_one, place)
+                found[id] = replace(outcome, readings=outcome.readings | {q.name: own})
     return found
+
+
+def _against(q: Quantity, own: Reading, finest_one: Reading, place: str) -> Reading:
+    """The reading of a run with its error against that of the finest run; without an error where one has no value."""
+    if own.why:
+        return own
+    if finest_one.why:
+        return replace(own, why=f"the finest run has no value: {finest_one.why}")
+    return against_number(q, own.value, finest_one.value, place)
 
 
 def orders(plan: Plan, found: dict[str, Outcome]) -> list[Order]:

@@ -14,7 +14,7 @@ from coupler.case.formula import BadFormula, evaluate_columns
 from coupler.case.sweep import Sweep, SweepQuantity
 from coupler.case.sweep_names import PLAIN
 from coupler.commands.study.plan import fingerprint
-from coupler.commands.study.reading import Curve, read, taken
+from coupler.commands.study.reading import Curve, NotRecorded, read, taken
 from coupler.program.errors import BadCase, SurgebreakError, did_you_mean
 from coupler.results import vtkhdf
 from coupler.results.history import BadTable, read_history
@@ -57,7 +57,7 @@ def read_quantity(run: Path, q: SweepQuantity) -> Reading:
     try:
         value = _value(run, q)
         why = "" if np.isfinite(value) else f"take = '{q.take}' finds no number"
-    except (BadCase, NoReading, BadTable, BadFormula) as error:
+    except (BadCase, NoReading, NotRecorded, BadTable, BadFormula) as error:
         value, why = np.nan, str(error)
     return Reading(float(value), why, definition(q))
 
