@@ -95,8 +95,31 @@ def test_the_distance_of_two_curves_is_their_root_mean_square(tmp_path):
     (tmp_path / "ref.csv").write_text(
         "# who\nt,v,low,high\n0,2,1.7,2.3\n1,2,1.7,2.3\n3,2,1.7,2.3\n9,2,1.7,2.3\n"
     )
-    q = measured(tmp_path)
+    q = measured(tmp_path, window=(0.0, 4.0))
     found = against_curve(q, Curve(np.linspace(0.0, 4.0, 50), np.full(50, 1.9)))
     assert found.value == pytest.approx(0.1)
     assert found.error == pytest.approx(0.05)
     assert found.band == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize(
+    ("end", "points", "window", "why"),
+    [
+        (
+            4.0,
+            (0, 1, 3, 9),
+            None,
+            r"the run has nothing from 4 to 9 s of the reference .*ref.csv; give a window",
+        ),
+        (0.5, (2, 3), None, "the run has nothing from 2 to 3 s of the reference"),
+        (4.0, (5, 6), (0, 4), "ref.csv: there is nothing from 0 to 4 s"),
+        (9.0, (0, 1, 3), (0, 9), "ref.csv: there is nothing from 3 to 9 s"),
+        (4.0, (1,), None, "ref.csv has one point"),
+    ],
+)
+def test_curves_that_do_not_cover_one_another_have_no_distance(tmp_path, end, points, window, why):
+    """A run that covers half of a reference had the distance of that half; one that met a point of it divided by 0."""
+    rows = "".join(f"{t},2,1.7,2.3\n" for t in points)
+    (tmp_path / "ref.csv").write_text(f"# who\nt,v,low,high\n{rows}")
+    with pytest.raises(NotRecorded, match=why):
+        against_curve(measured(tmp_path, window=window), Curve(np.linspace(0.0, end, 50), np.full(50, 1.9)))

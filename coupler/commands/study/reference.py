@@ -13,6 +13,7 @@ from coupler.case.records import read_record
 from coupler.case.study import Quantity
 from coupler.commands.study.reading import Curve, NotRecorded, taken
 from coupler.program.errors import BadCase
+from coupler.results.expected import lacking
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,20 @@ def against_number(q: Quantity, value: float, reference: float, place: str) -> R
 def against_curve(q: Quantity, found: Curve) -> Reading:
     """Root mean square distance from the reference curve, over its root mean square (or the scale).
 
-    Both are compared at the times of the reference that lie in the window and in the run. Raises NotRecorded.
+    Both are compared at the times of the reference that lie in the window, of all of which the run has to tell. Raises
+    NotRecorded.
     """
     reference = _part_of_file(q)
+    if missing := lacking(found.time, reference.time[0], reference.time[-1]):
+        raise NotRecorded(
+            f"the run has nothing {missing} of the reference {q.path}; give a window to compare a part of it"
+        )
     inside = (reference.time >= found.time[0]) & (reference.time <= found.time[-1])
     time, values = reference.time[inside], reference.values[inside]
+    if len(time) < 2:
+        raise NotRecorded(
+            f"{len(time)} points of {q.path} lie in the time of the run; a curve has two or more"
+        )
     difference = rms(time, np.interp(time, found.time, found.values) - values)
     scale = rms(time, values) if q.scale is None else abs(q.scale)
     band = 0.0
@@ -60,8 +70,10 @@ def against_curve(q: Quantity, found: Curve) -> Reading:
 
 
 def _part_of_file(q: Quantity, column: str | None = None) -> Curve:
-    """The part of a reference curve in the window. Raises NotRecorded."""
+    """The part of a reference curve in the window, of two points or more. Raises NotRecorded."""
     whole = file_curve(q, column)
+    if len(whole.time) < 2:
+        raise NotRecorded(f"{q.path} has one point; a curve has two or more")
     try:
         return whole.within(q.window)
     except NotRecorded as error:
