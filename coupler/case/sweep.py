@@ -161,7 +161,8 @@ class SweepQuantity(Section):
     damage: Literal["joints", "drift", "drop"] | None = Field(
         None,
         description="joints: share of the joints (of the group) that broke; drift: mean way sideways of the blocks "
-        "that stood around upper, less that around lower, over upper - lower, the largest of all written states; "
+        "that stood around upper, less that around lower (0 at level ground; below all blocks of a group that of the "
+        "blocks under it), over upper - lower, the largest of all written states; "
         "drop: mean fall of the blocks that stood between lower and upper, over upper - lower, at the end: a storey "
         "that came down has 1",
     )

@@ -15,9 +15,13 @@ from coupler.case.sweep import Sweep, SweepQuantity
 from coupler.case.sweep_names import PLAIN
 from coupler.commands.study.plan import fingerprint
 from coupler.commands.study.reading import Curve, NotRecorded, read, taken
-from coupler.program.errors import BadCase, SurgebreakError, did_you_mean
+from coupler.program.errors import BadCase, NoRun, SurgebreakError, did_you_mean
 from coupler.results import vtkhdf
 from coupler.results.history import BadTable, read_history
+from coupler.run.summary import read_summary
+
+SAME_COURSE = 0.1
+"""Share of the height of the blocks by which those that stand at one height may differ: files hold seven digits."""
 
 
 class NoReading(SurgebreakError):
@@ -57,7 +61,7 @@ def read_quantity(run: Path, q: SweepQuantity) -> Reading:
     try:
         value = _value(run, q)
         why = "" if np.isfinite(value) else f"take = '{q.take}' finds no number"
-    except (BadCase, NoReading, NotRecorded, BadTable, BadFormula) as error:
+    except (BadCase, NoReading, NoRun, NotRecorded, BadTable, BadFormula) as error:
         value, why = np.nan, str(error)
     return Reading(float(value), why, definition(q))
 
@@ -99,21 +103,45 @@ def joints_broken(run: Path, of: str | None) -> float:
 
 
 def drift(run: Path, q: SweepQuantity) -> float:
-    """Largest drift ratio: difference of the lateral displacements at the two heights over their distance."""
-    middle = middles(run / "blocks.vtkhdf")
+    """Largest drift ratio: difference of the lateral displacements at the two heights over their distance. Level ground
+    does not move; at a lower end under the blocks that count are those that they stand on."""
+    path = run / "blocks.vtkhdf"
+    middle = middles(path)
     own = _rows_of(run, q.of) if q.of else np.ones(middle.shape[1], bool)
-    upper = _way(middle, own, q.upper)
-    lower = _way(middle, own, q.lower)
+    slack = SAME_COURSE * float(np.median(heights(path)[own]))
+    upper = _way(middle, own, q.upper, slack)
+    if q.lower <= _ground(run) + slack:
+        lower = np.zeros_like(upper)
+    else:
+        lower = _way(middle, _own_or_under(middle, own, q.lower, slack), q.lower, slack)
     return float(np.linalg.norm((upper - lower)[:, :2], axis=1).max() / (q.upper - q.lower))
 
 
-def _way(middle: Array, own: Array, height: float) -> Array:
-    """Mean displacement (steps, 3) [m] of those of the own blocks that stood nearest to a height; 0 at the ground."""
-    start = middle[0, :, 2]
-    if height <= start[own].min() - 0.5 * np.ptp(start[own]) / max(own.sum() - 1, 1):
-        return np.zeros((len(middle), 3))
-    distance = np.where(own, np.abs(start - height), np.inf)
-    near = distance <= distance.min() + 1e-3 * max(np.ptp(start), 1e-9)
+def _ground(run: Path) -> float:
+    """Height [m] of the level ground that the structure stands on: that of structure.ground, or the floor of a tank
+    without terrain; -inf where there is none. Raises NoRun."""
+    case = read_summary(run)["case"]
+    ground, tank = (case.get("structure") or {}).get("ground"), case.get("tank") or {}
+    if ground:
+        return float(ground["level"])
+    return -np.inf if case.get("terrain") or not tank.get("lower") else float(tank["lower"][2])
+
+
+def _own_or_under(middle: Array, own: Array, height: float, slack: float) -> Array:
+    """Blocks (n,) bool of which some stood at a height: the own ones, and below the lowest of them also the others that
+    stood within their extent in plan, on which they may stand."""
+    start = middle[0]
+    if height >= start[own, 2].min() - slack:
+        return own
+    low, high = start[own, :2].min(axis=0) - slack, start[own, :2].max(axis=0) + slack
+    return own | ((start[:, :2] >= low) & (start[:, :2] <= high)).all(axis=1)
+
+
+def _way(middle: Array, counted: Array, height: float, slack: float) -> Array:
+    """Mean displacement (steps, 3) [m] of those of the counted blocks that stood nearest to a height, within slack
+    [m]."""
+    distance = np.where(counted, np.abs(middle[0, :, 2] - height), np.inf)
+    near = distance <= distance.min() + slack
     return (middle[:, near] - middle[0, near]).mean(axis=1)
 
 
@@ -131,11 +159,33 @@ def drop(run: Path, q: SweepQuantity) -> float:
 @lru_cache(maxsize=2)
 def middles(path: Path) -> Array:
     """Middle of the corners of every block at every written state (steps, n, 3) [m]."""
+    corners, owner = _corners(path)
+    number = np.bincount(owner).astype(float)
+    return np.stack(
+        [[np.bincount(owner, weights=step[:, axis]) / number for axis in range(3)] for step in corners]
+    ).transpose(0, 2, 1)
+
+
+@lru_cache(maxsize=2)
+def heights(path: Path) -> Array:
+    """Vertical extent (n,) [m] of every block at the first written state."""
+    corners, owner = _corners(path, states=1)
+    low, high = np.full(owner.max() + 1, np.inf), np.full(owner.max() + 1, -np.inf)
+    np.minimum.at(low, owner, corners[0, :, 2])
+    np.maximum.at(high, owner, corners[0, :, 2])
+    return high - low
+
+
+def _corners(path: Path, states: int | None = None) -> tuple[Array, Array]:
+    """Corners (steps, m, 3) [m] of all blocks at the first written states (all of them without a number), and the block
+    (m,) that each is of. Raises NoReading."""
     try:
         with vtkhdf.opened(path, "r") as file:
             root = file["VTKHDF"]
             steps, corners = vtkhdf.count(root), int(root["NumberOfPoints"][0])
+            steps = steps if states is None else min(steps, states)
             points = root["Points"][: steps * corners].reshape(steps, corners, 3).astype(float)
+            points += file["scene"].attrs["origin"]
             ends = root["Polygons/Offsets"][1:]
             owner = np.zeros(corners, int)
             faces = np.repeat(root["CellData/block"][: len(ends)], np.diff(ends, prepend=0))
@@ -144,10 +194,7 @@ def middles(path: Path) -> Array:
         raise NoReading(f"{path.name} cannot be read: {error}") from error
     if not steps:
         raise NoReading(f"{path.name} holds no state")
-    number = np.bincount(owner).astype(float)
-    return np.stack(
-        [[np.bincount(owner, weights=step[:, axis]) / number for axis in range(3)] for step in points]
-    ).transpose(0, 2, 1)
+    return points, owner
 
 
 def _rows_of(run: Path, name: str) -> Array:
