@@ -6,7 +6,10 @@ import statsmodels.api as sm
 from scipy.special import ndtr
 from statsmodels.miscmodels.ordinal_model import OrderedModel
 
+from coupler.case.sweep import DamageState, Fragility
 from coupler.commands.sweep.fit import bootstrap, check, fit, separation
+from coupler.commands.sweep.fragility import Runs, _fitted, dispersion_band
+from coupler.commands.sweep.page import _with_band
 
 BETA = 0.4
 
@@ -94,6 +97,52 @@ def test_a_band_of_90_per_cent_covers_the_known_curve_in_85_to_95_per_cent_of_th
         covered.append((low <= exact) & (exact <= high))
     share = np.mean(covered, axis=0)
     assert ((share >= 0.85) & (share <= 0.95)).all(), share
+
+
+def scattered(seed, beta, number=30):
+    """Runs at six intensities of structures with log-normal capacity of median 1.1, too few for so wide a scatter."""
+    rng = np.random.default_rng(seed)
+    x = np.repeat(np.linspace(0.5, 2.0, 6), number // 6)
+    return x, (np.log(x / 1.1) / beta + rng.normal(size=number) > 0.0).astype(int)
+
+
+@pytest.mark.parametrize("number", [30, 60])
+def test_the_band_of_the_dispersion_covers_the_known_one_and_holds_the_estimate(number):
+    """β = 1 from few runs: in many of the sets some samples of the bootstrap fall with the intensity, where 1/b jumps
+    from infinity to minus infinity. A third of the bands began below 0."""
+    covered, open_ended = [], 0
+    for seed in range(1000, 1200):
+        x, state = scattered(seed, 1.0, number)
+        best, sets = fit(x, state, 1), bootstrap(x, state, 1, 300, seed)
+        if best.rising[0] and sets.found.mean() >= 0.9:
+            low, high = dispersion_band(sets, 0.9)
+            assert 0.0 < low <= best.dispersion[0] <= high
+            covered.append(low <= 1.0 <= high)
+            open_ended += np.isinf(high)
+    assert len(covered) > 180
+    assert 0.85 <= np.mean(covered) <= 0.95
+    assert open_ended > 10
+
+
+def test_medians_of_samples_that_fall_with_the_intensity_make_no_band():
+    """β = 2 from 30 runs: a seventh of the samples have no rising curve, so that the band of the median is refused with
+    the reason, that of β has no upper end, and those of the curve stay."""
+    x, state = scattered(0, 2.0)
+    best, sets = fit(x, state, 1), bootstrap(x, state, 1, 500, 1)
+    assert best.rising[0]
+    assert sets.found.mean() > 0.95
+    assert sets.rising.mean() < 0.9
+    f = Fragility(name="f", measure="depth", state=(DamageState(name="falls", quantity="q", at_least=1.0),))
+    reported = _fitted(Runs(x, state, 0, 0, 0), f, [1], best, sets)
+    (curve,) = reported["curves"]
+    assert curve["median_band"] is None
+    assert reported["note"].startswith("no bands of medians: ")
+    assert "rises with depth" in reported["note"]
+    low, high = reported["dispersion_band"]
+    assert 0.0 < low < best.dispersion[0] < high == np.inf
+    p, lower, upper = (np.array(curve[name]) for name in ("p", "low", "high"))
+    assert ((lower <= p) & (p <= upper)).all()
+    assert _with_band(1.0, [low, None], "1").endswith("to ∞)")
 
 
 def test_separated_runs_have_no_maximum():

@@ -34,6 +34,12 @@ class Fits:
     found: Array
 
     @property
+    def rising(self) -> Array:
+        """(s,) bool: whether there is a fit in which states become more probable with the intensity; only then are
+        dispersion and median those of a curve."""
+        return self.found & (self.slope > 0.0)
+
+    @property
     def dispersion(self) -> Array:
         """β (s,); not finite where there is no fit"""
         with np.errstate(all="ignore"):

@@ -188,13 +188,14 @@ def _fitted(runs: Runs, f: Fragility, kept: list[int], best: Fits, samples: Fits
     """Curves with their bands; bands are refused where too many samples of the bootstrap have no fit."""
     low, high = runs.x.min(), runs.x.max()
     x = np.geomspace(low / (high / low) ** 0.1, high * (high / low) ** 0.1, POINTS)
-    share = float(samples.found.mean())
+    share, rising = float(samples.found.mean()), float(samples.rising.mean())
     banded = share >= LEAST_FOUND
     ends = 50.0 * (1.0 - f.confidence), 50.0 * (1.0 + f.confidence)
     found, p = [], best.probability(x)[0]
     good = Fits(samples.slope[samples.found], samples.cut[samples.found], samples.found[samples.found])
     bands = np.percentile(good.probability(x), ends, axis=0) if banded else None
-    medians = np.percentile(good.median, ends, axis=0) if banded else None
+    centred = rising >= LEAST_FOUND
+    medians = np.percentile(samples.median[samples.rising], ends, axis=0) if centred else None
     for row, k in enumerate(kept):
         found.append(
             {
@@ -207,15 +208,16 @@ def _fitted(runs: Runs, f: Fragility, kept: list[int], best: Fits, samples: Fits
                 "high": None if bands is None else bands[1, row].tolist(),
             }
         )
-    beta = np.percentile(good.dispersion, ends).tolist() if banded else None
-    note = (
-        ""
-        if banded
-        else (
-            f"no bands: {1 - share:.0%} of the samples of the bootstrap have no fit, since too few runs lie where some "
-            "reach a state and others do not; add runs there"
+    beta = dispersion_band(samples, f.confidence) if banded else None
+    why = "since too few runs lie where some reach a state and others do not; add runs there"
+    note = ""
+    if not banded:
+        note = f"no bands: {1 - share:.0%} of the samples of the bootstrap have no fit, {why}"
+    elif not centred:
+        note = (
+            f"no bands of medians: {1 - rising:.0%} of the samples of the bootstrap have no curve that rises with "
+            f"{f.measure}, {why}"
         )
-    )
     return {
         "curves": found,
         "dispersion": float(best.dispersion[0]),
@@ -223,6 +225,14 @@ def _fitted(runs: Runs, f: Fragility, kept: list[int], best: Fits, samples: Fits
         "found": share,
         "note": note,
     }
+
+
+def dispersion_band(samples: Fits, confidence: float) -> list[float]:
+    """Ends of the band of β = 1/b from those of the slope b. Samples that fall with the intensity (b < 0) lie beyond
+    the flat one: where the band of b reaches to 0, that of β has no upper end."""
+    tail = 50.0 * (1.0 - confidence)
+    steep, flat = np.percentile(samples.slope[samples.found], [100.0 - tail, tail])
+    return [float(1.0 / b) if b > 0.0 else math.inf for b in (steep, flat)]
 
 
 def bars(runs: Runs, states: int, confidence: float) -> list[list[dict]]:
@@ -257,8 +267,8 @@ def convergence(x: Array, state: Array, states: int, f: Fragility, seed: int) ->
         for order in orders if share < 1.0 else orders[:1]:
             own = order[:n]
             found = bootstrap(x[own], state[own], states, max(100, f.bootstrap // 5), seed)
-            if found.found.mean() >= LEAST_FOUND:
-                median = found.median[found.found, 0]
+            if found.rising.mean() >= LEAST_FOUND:
+                median = found.median[found.rising, 0]
                 low, high = np.percentile(median, ends)
                 widths.append(float(np.log(high / low)))
         if widths:

@@ -191,9 +191,11 @@ def _medians(f: dict) -> str:
     )
 
 
-def _with_band(value: float, band: list[float] | None, unit: str) -> str:
+def _with_band(value: float, band: list[float | None] | None, unit: str) -> str:
+    """A number with its band, an end of which is None where it is infinite."""
     ended_runs = quantity(value, unit)
-    return f"{ended_runs} ({quantity(band[0], unit)} to {quantity(band[1], unit)})" if band else ended_runs
+    low, high = (quantity(end, unit) if end is not None else "∞" for end in band or (None, None))
+    return f"{ended_runs} ({low} to {high})" if band else ended_runs
 
 
 def _counted(f: dict) -> str:
