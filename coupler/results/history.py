@@ -53,6 +53,33 @@ class History:
         return self.values[name]
 
 
+@dataclass(frozen=True)
+class ByBlock:
+    """A table with a row for each block at each time, as arrays: label, the column that names blocks · times (t,) ·
+    names (n,) · values (t, n) by column, NaN where a row is missing."""
+
+    label: str
+    times: np.ndarray
+    names: list
+    values: dict
+
+
+def by_block(history):
+    """The ByBlock of a table with a column of text; None for one with a row for each time."""
+    label = next((c.name for c in history.columns if c.unit == ""), None)
+    if label is None or "time" not in history.values:
+        return None
+    times, at = np.unique(history["time"], return_inverse=True)
+    names = list(dict.fromkeys(history[label].tolist()))
+    of = np.array([names.index(name) for name in history[label].tolist()], int)
+    values = {}
+    for column in history.columns:
+        if column.name not in ("time", label):
+            values[column.name] = np.full((len(times), len(names)), np.nan)
+            values[column.name][at, of] = history[column.name]
+    return ByBlock(label, times, names, values)
+
+
 class CannotContinue(SurgebreakError):
     """A result file is not as the run left it, so it cannot be continued."""
 

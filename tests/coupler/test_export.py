@@ -14,8 +14,9 @@ from typer.testing import CliRunner
 
 from coupler.commands.cli import app
 from coupler.commands.export.command import CannotExport, export
+from coupler.commands.export.netcdf import FILL, write_netcdf
 from coupler.commands.export.stored import stored
-from coupler.results.history import read_history
+from coupler.results.history import HistoryTable, read_history
 from coupler.results.vtkhdf import read_step, read_tetrahedra, read_times
 from tests.coupler.fake_runs import SUMMARY
 from tests.coupler.synthetic_run import write_run
@@ -87,6 +88,28 @@ def test_histories_say_their_units(run, exported):
             np.testing.assert_array_equal(file.variables[column.name][:], table[column.name])
             assert file.variables[column.name].units.decode() == column.unit
         assert file.Conventions.startswith(b"CF-")
+
+
+@pytest.mark.parametrize("rows", [4, 3])
+def test_loads_of_each_block_are_over_time_and_block(tmp_path, rows):
+    """Two blocks at two times; a run that was killed may lack the last row."""
+    (tmp_path / "history").mkdir()
+    columns = [("time", "s", "t"), ("block", "", "name of the block"), ("over", "s", "o"), ("f_x", "N", "f")]
+    with HistoryTable(tmp_path / "history" / "loads_wall_blocks.csv", columns) as table:
+        for time, block, force in [
+            (0.1, "wall-ä", 1.0),
+            (0.1, "b", 2.0),
+            (0.2, "wall-ä", 3.0),
+            (0.2, "b", 4.0),
+        ][:rows]:
+            table.append(time=time, block=block, over=0.1, f_x=force)
+    (made,) = write_netcdf(tmp_path, tmp_path, "a wall")
+    with netcdf_file(made, mmap=False) as file:
+        assert file.variables["time"][:].tolist() == [0.1, 0.2]
+        assert file.variables["f_x"].dimensions == ("time", "block")
+        assert file.variables["f_x"][:].tolist() == [[1.0, 2.0], [3.0, 4.0 if rows == 4 else FILL]]
+        names = [b"".join(row).rstrip(b"\0").decode() for row in file.variables["block"][:]]
+        assert names == ["wall-ä", "b"]
 
 
 def test_every_block_is_an_object_of_its_name(run, exported):

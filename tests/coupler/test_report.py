@@ -250,3 +250,18 @@ def test_the_maps_of_a_flood_are_in_the_page(tmp_path):
     assert _flood(tmp_path) == ""
     (tmp_path / "flood_map.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     assert "Largest depth" in _flood(tmp_path)
+
+
+def test_tables_of_many_blocks_are_named_in_place_of_their_figures(tmp_path):
+    from coupler.commands.report.run_page import _histories
+
+    (tmp_path / "history").mkdir()
+    for name, number in (("few", 2), ("many", 8)):
+        columns = [("time", "s", "t"), ("block", "", "name"), ("f_x", "N", "f")]
+        with HistoryTable(tmp_path / "history" / f"loads_{name}_blocks.csv", columns) as table:
+            for k in range(number):
+                table.append(time=0.1, block=f"b{k}", f_x=1.0)
+    (tmp_path / "loads_few_blocks.png").write_bytes(PIXEL)
+    shown = _histories(tmp_path, tmp_path, of_scheme=False)
+    assert len(shown) == 2
+    assert "more than 7 blocks: history/loads_many_blocks.csv." in shown[1]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from coupler.commands.view.__main__ import main, pixels, rate
-from coupler.commands.view.plots import common, grouped
+from coupler.commands.view.plots import LINES_PER_PANEL, common, grouped, of_each_block, plots
 from coupler.program import extras
 from coupler.results.fields import WaterWriter
-from coupler.results.history import HistoryTable, read_history
+from coupler.results.history import HistoryTable, by_block, read_history
 from tests.coupler.synthetic_run import tank_mesh, write_run
 
 ROOT = Path(__file__).parents[2]
@@ -270,3 +270,21 @@ def test_a_figure_of_many_panels_goes_on_where_a_page_of_paper_ends():
     heights = [sum(LOW_PANEL if unit == "1" else PANEL for unit, _ in leaf) for leaf in found]
     assert max(heights) <= TALLEST
     assert len(found) == 2
+
+
+@pytest.mark.parametrize("number", [2, LINES_PER_PANEL + 1])
+def test_loads_of_each_block_are_a_line_each_or_no_figure(tmp_path, number):
+    """One line ran through the rows of all blocks, up and down at every time."""
+    (tmp_path / "history").mkdir()
+    path = tmp_path / "history" / "loads_wall_blocks.csv"
+    columns = [("time", "s", "t"), ("block", "", "name"), ("f_x", "N", "f"), ("f_y", "N", "nothing")]
+    with HistoryTable(path, columns) as table:
+        for time in (0.1, 0.2):
+            for k in range(number):
+                table.append(time=time, block=f"b{k}", f_x=time + k, f_y=0.0)
+    history = read_history(path)
+    made, panels = of_each_block(history, by_block(history))
+    assert panels == [("N", [f"f_x_b{k}" for k in range(number)])]
+    assert made["time"].tolist() == [0.1, 0.2]
+    assert made["f_x_b1"].tolist() == [1.1, 1.2]
+    assert [p.name for p in plots(tmp_path, tmp_path)] == (["loads_wall_blocks.pdf"] if number == 2 else [])

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.results.history import History, read_history
+from coupler.results.history import History, by_block, read_history
 from coupler.results.maps import Map, read_map
 
 CONVENTIONS = "CF-1.10"
@@ -72,13 +72,32 @@ def _write(path: Path, table: History, title: str) -> None:
         file.Conventions = CONVENTIONS
         file.title = f"{title}: {table.title}".encode()
         file.source = b"surgebreak"
-        file.createDimension("time", len(table["time"]))
+        blocks = by_block(table)
+        values = table.values if blocks is None else blocks.values | {"time": blocks.times}
+        file.createDimension("time", len(values["time"]))
+        if blocks is not None:
+            _write_names(file, blocks.label, blocks.names)
         for column in table.columns:
             if column.unit == "":
                 continue
-            made = file.createVariable(column.name, "f8", ("time",))
-            made[:] = table[column.name]
+            along = ("time",) if blocks is None or column.name == "time" else ("time", blocks.label)
+            made = file.createVariable(column.name, "f8", along)
+            missing = np.isnan(values[column.name])
+            if len(along) > 1 and missing.any():
+                made._FillValue = FILL
+            made[:] = np.where(missing, FILL, values[column.name]) if len(along) > 1 else values[column.name]
             made.units = column.unit.encode()
             made.long_name = column.meaning.encode("ascii", "replace")
             if column.name == "time":
                 made.axis = b"T"  # seconds since the start: a number, no date
+
+
+def _write_names(file, label: str, names: list[str]) -> None:
+    """The names of blocks as a coordinate: rows of characters, which classic NetCDF has in place of text."""
+    texts = [name.encode() for name in names]
+    longest = max(map(len, texts), default=1) or 1
+    file.createDimension(label, len(names))
+    file.createDimension(f"{label}_characters", longest)
+    made = file.createVariable(label, "c", (label, f"{label}_characters"))
+    made[:] = np.array([list(text.ljust(longest, b"\0")) for text in texts], np.uint8).view("S1")
+    made._Encoding, made.long_name = b"utf-8", b"name of the block"

@@ -22,8 +22,10 @@ from coupler.commands.report.html import (
 )
 from coupler.commands.report.stands import FIGURES as OF_VERDICT
 from coupler.commands.report.stands import stands
+from coupler.commands.view.palette import LINES
 from coupler.program.process import was_killed
 from coupler.program.quantities import percent, quantity
+from coupler.results.history import by_block, read_history
 
 CAPTIONS = {
     "gauges": "Gauges",
@@ -242,7 +244,23 @@ def over_data(run: Path, pictures: Path) -> list[Path]:
 
 def _histories(run: Path, pictures: Path, of_scheme: bool) -> list[str]:
     found = [(p, p.stem.rstrip("0123456789").rstrip("_")) for p in plots(run, pictures)]
-    return [figure(p, _caption(stem, p.stem)) for p, stem in found if (stem in OF_SCHEME) == of_scheme]
+    shown = [figure(p, _caption(stem, p.stem)) for p, stem in found if (stem in OF_SCHEME) == of_scheme]
+    without = [] if of_scheme else _of_many_blocks(run)
+    if shown and without:
+        shown.append(
+            note(f"Without a figure, since they have more than {len(LINES)} blocks: {', '.join(without)}.")
+        )
+    return shown
+
+
+def _of_many_blocks(run: Path) -> list[str]:
+    """The tables with a row for each block that have more blocks than a panel has lines."""
+    found = []
+    for path in sorted((run / "history").glob("loads_*_blocks.csv")):
+        blocks = by_block(read_history(path))
+        if blocks is not None and len(blocks.names) > len(LINES):
+            found.append(f"history/{path.name}")
+    return found
 
 
 def _caption(stem: str, leaf: str) -> str:

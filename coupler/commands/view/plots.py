@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from coupler.commands.view.palette import INK, LINES
-from coupler.results.history import read_history
+from coupler.results.history import Column, History, by_block, read_history
 
 WIDTH = 6.9  # [inch] two columns of a journal
 PANEL, LOW_PANEL = 1.75, 1.05  # [inch] height of a panel, and of one with a pure number
@@ -39,17 +39,40 @@ STYLE = {
 
 
 def plots(directory, folder):
-    """Write the figures of all tables in `directory`/history; return the paths of the PDF files."""
+    """Write the figures of all tables in `directory`/history, but for those of more blocks than a panel has lines;
+    return the paths of the PDF files."""
     written = []
     for table in sorted((directory / "history").glob("*.csv")):
         history = read_history(table)
-        panels = grouped(history)
+        blocks = by_block(history)
+        if blocks is not None and len(blocks.names) > LINES_PER_PANEL:
+            continue
+        if blocks is None:
+            panels = grouped(history)
+        else:
+            history, panels = of_each_block(history, blocks)
         if panels and len(history["time"]) > 1:
             written += [
                 figure(history, some, folder / (table.stem if leaf == 1 else f"{table.stem}_{leaf}"))
                 for leaf, some in enumerate(leaves(panels), start=1)
             ]
     return written
+
+
+def of_each_block(history, blocks):
+    """A table with a column for each block, and its panels: one for each column that is more than round-off."""
+    columns, values, panels, largest = [Column("time", "s", "time")], {"time": blocks.times}, [], {}
+    shown = [c for c in history.columns if c.name in blocks.values]
+    for column in shown:
+        size = np.nanmax(np.abs(blocks.values[column.name]), initial=0.0)
+        largest[column.unit] = max(largest.get(column.unit, 0.0), size)
+    for column in shown:
+        names = [f"{column.name}_{name}" for name in blocks.names]
+        columns += [Column(name, column.unit, column.meaning) for name in names]
+        values |= dict(zip(names, blocks.values[column.name].T))
+        if np.nanmax(np.abs(blocks.values[column.name]), initial=0.0) > NEGLIGIBLE * largest[column.unit]:
+            panels.append((column.unit, names))
+    return History(history.title, tuple(columns), values), panels
 
 
 def leaves(panels):
