@@ -272,7 +272,7 @@ name = "box"
 size = [1, 1, 1]
 centre = [0, 0, 5]
 [contact]
-stiffness = 1e6
+stiffness = 1e5
 [[gauge]]
 kind = "motion"
 name = "box"
