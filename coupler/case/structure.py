@@ -245,7 +245,8 @@ class TownRule(Section):
 
 class Town(Section):
     """Houses on the terrain from a file of footprints: each is a building with walls, floors and a roof on its smallest
-    rectangle or along its outline. They are called NAME-0, NAME-1, ... in the order of the file, or by name_from."""
+    rectangle or along its outline. They are called NAME-0, NAME-1, ... in the order of the file, or by name_from;
+    further polygons of one feature end in -1, -2, ..."""
 
     name: Name = Field("town", description="prefix of the names of its houses")
     path: Annotated[str, Field(min_length=1)] = Field(

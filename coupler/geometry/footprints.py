@@ -35,13 +35,14 @@ class FootprintError(SurgebreakError):
 
 @dataclass(frozen=True)
 class Footprint:
-    """corners (k, 2), counter-clockwise, each once, in units of the file · attributes · number in the file · system:
-    coordinate system that the file names, "" for none."""
+    """corners (k, 2), counter-clockwise, each once, in units of the file · attributes · number of its feature in the
+    file · system: coordinate system that the file names, "" for none · part: which polygon of its feature it is."""
 
     corners: Array
     attributes: dict
     number: int
     system: str = ""
+    part: int = 0
 
     @property
     def area(self) -> float:
@@ -89,9 +90,9 @@ def _geojson(name: str, path: Path) -> list[Footprint]:
             raise FootprintError(
                 f"{name}: feature {number} is a {kind or 'nothing'}; footprints are polygons"
             )
-        for polygon in [rings] if kind == "Polygon" else rings:
+        for part, polygon in enumerate([rings] if kind == "Polygon" else rings):
             attributes = feature.get("properties") or {}
-            found.append(Footprint(_corners(name, number, polygon), attributes, number, system))
+            found.append(Footprint(_corners(name, number, polygon), attributes, number, system, part))
     if not found:
         raise FootprintError(f"{name}: no polygons in it")
     return found

@@ -177,7 +177,7 @@ def _storeys(name: str, town, footprint: Footprint, otherwise: int) -> int:
         return otherwise
     try:
         storeys = int(float(value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):  # the last for infinity
         storeys = 0
     if not 1 <= storeys <= 100:
         raise FootprintError(
@@ -187,13 +187,15 @@ def _storeys(name: str, town, footprint: Footprint, otherwise: int) -> int:
 
 
 def _name(name: str, town, footprint: Footprint) -> str:
+    """The name of a house; further polygons of one feature, which share its attributes, end in -1, -2 and so on."""
+    more = f"-{footprint.part}" if footprint.part else ""
     if town.name_from is None:
-        return f"{town.name}-{footprint.number}"
+        return f"{town.name}-{footprint.number}{more}"
     value = str(footprint.attributes.get(town.name_from, ""))
     word = re.sub(r"[^A-Za-z0-9_-]+", "-", value).strip("-")
     if not word:
         raise FootprintError(f"{name}: feature {footprint.number} has no {town.name_from} to be named after")
-    return word if word[0].isalpha() else f"{town.name}-{word}"
+    return f"{word}{more}" if word[0].isalpha() else f"{town.name}-{word}{more}"
 
 
 def town_problems(case: Case) -> Iterator[tuple[tuple, str]]:
@@ -216,7 +218,7 @@ def town_problems(case: Case) -> Iterator[tuple[tuple, str]]:
 
 def _idle_rules(path, town) -> Iterator[tuple[tuple, str]]:
     """Rules, and numbers of storeys, by an attribute that no footprint of the file has."""
-    known = _attributes(town)
+    known = [footprint.attributes for footprint in _known(town)]
     asked = [((*path, "rule", k, "attribute"), rule.attribute) for k, rule in enumerate(town.rule)]
     if town.storeys_from is not None:
         asked.append(((*path, "storeys_from"), town.storeys_from))
@@ -231,16 +233,16 @@ def town_remarks(case: Case) -> Iterator[str]:
     """Rules for a value that no footprint has: allowed, since one set of rules may serve many files, but often a
     slip; and footprints that do not say their number of storeys."""
     for i, town in enumerate(case.structure.town if case.structure else ()):
-        known = _attributes(town)
-        silent = [k for k, a in enumerate(known) if town.storeys_from and a.get(town.storeys_from) is None]
+        known = _known(town)
+        silent = [f for f in known if town.storeys_from and f.attributes.get(town.storeys_from) is None]
         if silent:
             yield (
                 f"structure.town[{i}]: {len(silent)} of {len(known)} footprints say nothing under "
-                f"'{town.storeys_from}' (the first is feature {silent[0]}): they get storeys = {town.storeys}, or what "
+                f"'{town.storeys_from}' (the first is feature {silent[0].number}): they get storeys = {town.storeys}, or what "
                 "a rule says"
             )
         for k, rule in enumerate(town.rule):
-            values = {a[rule.attribute] for a in known if rule.attribute in a}
+            values = {f.attributes[rule.attribute] for f in known if rule.attribute in f.attributes}
             if rule.equals not in values:
                 there = ", ".join(sorted(map(repr, values))[:MOST_VALUES])
                 near = did_you_mean(str(rule.equals), {str(v) for v in values} - {str(rule.equals)})
@@ -250,10 +252,9 @@ def town_remarks(case: Case) -> Iterator[str]:
                 )
 
 
-def _attributes(town) -> list[dict]:
-    """Attributes of every footprint; the file is not read where no rule needs them."""
-    wanted = town.rule or town.storeys_from is not None
-    return [f.attributes for f in read_footprints(Path(town.path))] if wanted else []
+def _known(town) -> list[Footprint]:
+    """Every footprint, for its attributes; the file is not read where no rule needs them."""
+    return read_footprints(Path(town.path)) if town.rule or town.storeys_from is not None else []
 
 
 def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:

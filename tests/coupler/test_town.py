@@ -125,6 +125,37 @@ def test_houses_stand_where_the_file_has_them_with_what_the_rules_say(tmp_path):
     assert [solid.name for solid in solids_of(case)] == ["a-footing", "b-footing"]
 
 
+def both_in_one_feature():
+    """The two houses as the polygons of one feature, as surveys write a farm with its barn."""
+    rings = [[house["geometry"]["coordinates"][0]] for house in HOUSES]
+    properties = {"id": "farm", "built": "brick", "levels": 2}
+    return [
+        {
+            "type": "Feature",
+            "properties": properties,
+            "geometry": {"type": "MultiPolygon", "coordinates": rings},
+        }
+    ]
+
+
+@pytest.mark.parametrize(
+    ("sets", "names"),
+    [([], ["farm", "farm-1"]), (["structure.town[0].name_from=absent"], ["town-0", "town-0-1"])],
+)
+def test_every_polygon_of_a_feature_is_a_house_with_a_name_of_its_own(tmp_path, sets, names):
+    """They share the number and the attributes of the feature, and were refused as houses of one name."""
+    case = loaded(tmp_path, *sets, houses=both_in_one_feature())
+    assert [part.name for part in parts_of(case)] == names
+
+
+def test_the_first_footprint_without_storeys_is_told_by_the_number_of_its_feature(tmp_path):
+    silent = feature(ring((34, 15), (4, 4)), id="shed", built="brick", levels=None)
+    found = remarks(loaded(tmp_path, houses=[*both_in_one_feature(), silent]))
+    assert any(
+        "1 of 3 footprints say nothing under 'levels' (the first is feature 1)" in line for line in found
+    )
+
+
 ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
 
 
@@ -149,6 +180,11 @@ ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
             [feature(ring((30, 8), (9, 7)), id="a", levels="two")],
             [],
             "levels = 'two' is no number of storeys",
+        ),
+        (
+            [feature(ring((30, 8), (9, 7)), id="a", levels="inf")],
+            [],
+            "levels = 'inf' is no number of storeys",
         ),
         (
             HOUSES,
