@@ -18,6 +18,14 @@ at the crossing of every edge to its nodes as zero does where the air is open:
 with s = (dt/ρ) k_ij/ϑ_ij.  So neither a stiff cushion nor a soft one limits the step, and a pocket loads a body in the
 same way as water does.  θ_k is 1/2, which keeps the energy of a cushion that the steps resolve; where R changed its
 sign from one step to the next it is 1 for a step, so that a cushion too stiff to be resolved comes to rest.
+
+Air that leaves through openings (`leaks.py`) is taken off R_k in (2), as the volume it has in the pocket,
+
+    W_k = Σ g_kl (P_k - P_l),        P = X + known,        g = (V/V_a) q/(P_k - P_l),                        (4)
+
+P = 0 in the open air, with g at a pressure half way between that over the last step and the one to which (2) and the
+law of the openings lead at the last rate R^n.  The conductances g/θ_k add a symmetric, positive matrix to (3); the flow
+does not give energy, and is exact where it is steady.  What left is found at the end of the step from the volumes then.
 """
 
 from __future__ import annotations
@@ -28,7 +36,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Array
-from fluid.air.gas import Gas
+from fluid.air.gas import SMALLEST_VOLUME, Gas
+from fluid.air.leaks import Openings
 from fluid.air.pockets import OPEN_AIR, SLIVER, Descent, bricks, labelled, volumes, without
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import SMALLEST_CUT
@@ -116,13 +125,18 @@ class Air:
 class Cushions:
     """The K pockets of a step.
 
-    air: their contents, with the labels of the new surface · pressure (K,) [Pa] P^n · stiffness (K,) [Pa/m³] S ·
-    theta (K,) · known (K,) [Pa] part of the pressure that is not sought · links csr (n, K) s of (3) [m³/(s Pa)]."""
+    air: their contents, with the labels of the new surface · volume (K,) [m³] and pressure (K,) [Pa], P^n, at the
+    beginning · stiffness (K,) [Pa/m³] S · theta (K,) · known (K,) [Pa] part of the pressure that is not sought · links
+    csr (n, K) s of (3) [m³/(s Pa)] · openings through which air leaves · leak (K, K) [m³/(s Pa)]: g/θ_k of (4), None
+    without openings."""
 
     air: Air
+    volume: Array
     pressure: Array
     stiffness: Array
     theta: Array
+    openings: Openings | None = None
+    leak: Array | None = None
     known: Array = field(default_factory=lambda: np.zeros(0))
     links: sp.csr_array | None = None
 
@@ -152,7 +166,7 @@ class Cushions:
             reference=reference,
             rate=descent.share.T @ air.rate,
             end_pressure=np.where(same, _of_parent(air.end_pressure, descent.only), pressure),
-            mean_pressure=pressure,
+            mean_pressure=np.where(same, _of_parent(air.mean_pressure, descent.only), pressure),
             turned=_of_parent(air.turned, descent.only) | ~same,
             name=name,
             names=names,
@@ -163,10 +177,26 @@ class Cushions:
         )
         theta = np.where(now.turned, SETTLING, RESOLVED)
         stiffness = gas.stiffness(reference, volume)
-        return cls(air=now, pressure=pressure, stiffness=stiffness, theta=theta)
+        return cls(air=now, volume=volume, pressure=pressure, stiffness=stiffness, theta=theta)
 
     def __len__(self) -> int:
         return len(self.pressure)
+
+    def leaking(self, openings: Openings, dt: float) -> Cushions:
+        """The cushions whose air leaves through these openings over dt [s]."""
+        if len(openings) == 0:
+            return self
+        air, gas, span = self.air, self.air.gas, self.theta * dt
+        ahead = self.volume * np.exp(-span * air.rate / np.maximum(self.volume, SMALLEST_VOLUME))
+        one, other = openings.ends(openings.evened(gas, air.reference, ahead, span)[0])
+        last = np.subtract(*openings.ends(air.mean_pressure))
+        lower = np.minimum(one, other)
+        conductance = gas.conductance(
+            lower + 0.5 * (np.abs(one - other) + np.abs(last)), lower, openings.area
+        )
+        thinner = openings.mean(self.volume / np.maximum(air.reference, SMALLEST_VOLUME))
+        weighted = conductance * thinner * openings.mean(1.0 / self.theta)
+        return replace(self, openings=openings, leak=openings.laplacian(weighted, len(self)))
 
     def beside(self, graph, phi, dofs, theta: float, kick, scale: float) -> Cushions:
         """The cushions with their links to the wet nodes dofs (n,), and with the known part of the pressure.
@@ -188,8 +218,11 @@ class Cushions:
 
     def lowest(self, dt: float) -> float:
         """Lowest pressure [Pa] of any air in the step, open air included; twice the predicted drop of a pocket is
-        allowed for."""
-        ahead = self.pressure + 2.0 * self.stiffness * dt * np.minimum(self.air.rate, 0.0)
+        allowed for, less by the air that comes in through openings."""
+        rate = self.air.rate
+        if self.leak is not None:
+            rate = rate - np.minimum(self.theta * (self.leak @ self.pressure), 0.0)
+        ahead = self.pressure + 2.0 * self.stiffness * dt * np.minimum(rate, 0.0)
         return float(min(ahead.min(initial=0.0), 0.0))
 
     def compliance(self, dt: float) -> Array:
@@ -198,7 +231,8 @@ class Cushions:
 
     def source(self, dt: float) -> Array:
         """Right hand side (K,) [m³/s] of (3) without the flow of the water and the bodies."""
-        return self.compliance(dt) * (self.pressure - self.known) + self._carried_rate()
+        out = self.compliance(dt) * (self.pressure - self.known) + self._carried_rate()
+        return out if self.leak is None else out - self.leak @ self.known
 
     def _carried_rate(self):
         return self.air.rate * (1.0 - self.theta) / self.theta
@@ -207,6 +241,8 @@ class Cushions:
         """The matrix (n, n) of the water with the rows of the pockets behind it, csr (n + K, n + K)."""
         total = np.asarray(self.links.sum(axis=0)).ravel()
         own = sp.diags_array(self.compliance(dt) + total)
+        if self.leak is not None:
+            own = sp.csr_array(own + sp.csr_array(self.leak))
         return sp.csr_array(sp.block_array([[matrix, -self.links], [-self.links.T, own]], format="csr"))
 
     def within(self, problem, rhs, coupling, void, domain):
@@ -256,11 +292,23 @@ class Cushions:
 
     def after(self, x, theta: float, dt: float) -> Air:
         """The air after a step with the unknown part x (K,) [Pa] of its pressure."""
-        rate = self.compliance(dt) * (x + self.known - self.pressure) - self._carried_rate()
+        mean_pressure = x + self.known
+        rate = self.compliance(dt) * (mean_pressure - self.pressure) - self._carried_rate()
+        if self.leak is not None:
+            rate = rate + self.leak @ mean_pressure
         turned = (rate * self.air.rate < 0.0) & ~self.air.turned
         return replace(
-            self.air, rate=rate, end_pressure=x / theta, mean_pressure=x + self.known, turned=turned
+            self.air, rate=rate, end_pressure=x / theta, mean_pressure=mean_pressure, turned=turned
         )
+
+    def leaked(self, air: Air, volume, dt: float) -> Air:
+        """The air after what left through the openings over the step; volume (K,) [m³] of the pockets at its end."""
+        if self.openings is None:
+            return air
+        before = air.reference
+        _, reference = self.openings.evened(air.gas, before, volume, dt)
+        lost = float(air.gas.lost_energy(before, self.volume, reference, volume).sum())
+        return replace(air, reference=reference, lost=air.lost + lost)
 
 
 def _handed_on(air: Air, before, topology, phi, label, count: int):

@@ -31,6 +31,8 @@ SMALLEST_VOLUME = 1e-12
 """Volume [m³] below which the gas law is not followed, so that a vanishing pocket keeps a finite pressure."""
 NEARLY_ISOTHERMAL = 1e-6
 """γ - 1 below which the limit of γ = 1 is taken."""
+EVEN = 1e-9
+"""Difference of pressure [Pa] below which the flow through an orifice goes with it, not with its root."""
 
 
 @dataclass(frozen=True)
@@ -63,18 +65,39 @@ class Gas:
         inner = self.atmospheric * (there**self.gamma * v ** (1.0 - self.gamma) - a) / (self.gamma - 1.0)
         return inner - outside
 
-    def leaked(self, reference: float, volume: float, outside: float, area: float, dt: float) -> float:
-        """Change [m³] of the reference volume in dt [s] through an effective area C_d A [m²], at a gauge pressure
-        `outside` [Pa] beyond it. The flow ends where the pressures are even."""
-        inside = float(self.pressure(reference, volume))
-        higher, lower = max(inside, outside) + self.atmospheric, min(inside, outside) + self.atmospheric
-        if higher <= lower or area == 0.0:
-            return 0.0
+    def lost_energy(self, before, volume_before, after, volume_after) -> Array:
+        """Energy (K,) [J] that air takes along or that is dissipated while the reference volume of a pocket changes
+        from `before` to `after` and its volume with it (K,) [m³], both in proportion: -∫ ∂U/∂V_a dV_a. With U of (2) at
+        both ends this leaves the work ∫ P dV of the water."""
+        a, b, v, w = (np.asarray(x, float) for x in (before, after, volume_before, volume_after))
+        mean = 0.0
+        for share in (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5):
+            there, room = a + share * (b - a), np.maximum(v + share * (w - v), SMALLEST_VOLUME)
+            packed = np.log(np.maximum(there, 1e-300) / room)
+            if self.gamma - 1.0 < NEARLY_ISOTHERMAL:
+                mean += 0.5 * self.atmospheric * packed
+            else:
+                bent = np.expm1((self.gamma - 1.0) * packed) / (self.gamma - 1.0)
+                mean += 0.5 * self.gamma * self.atmospheric * bent
+        return (a - b) * mean
+
+    def excess(self, pressure, volume) -> Array:
+        """V_a - V (K,) [m³] at a gauge pressure (K,) [Pa] and volume (K,) [m³]: (1) the other way round."""
+        return np.asarray(volume) * np.expm1(np.log1p(np.asarray(pressure) / self.atmospheric) / self.gamma)
+
+    def flow(self, one, other, area) -> Array:
+        """Reference volume (W,) [m³/s] that passes effective areas C_d A (W,) [m²] by (3), from the gauge pressures
+        `one` to `other` (W,) [Pa]; negative the other way."""
+        return self.conductance(one, other, area) * (np.asarray(one) - np.asarray(other))
+
+    def conductance(self, one, other, area) -> Array:
+        """`flow` over the difference of the pressures (W,) [m³/(s Pa)], of which at least EVEN counts."""
+        one, other = np.asarray(one, float), np.asarray(other, float)
+        higher = np.maximum(one, other) + self.atmospheric
+        difference = np.maximum(np.abs(one - other), EVEN)
         gamma = max(self.gamma, 1.0 + NEARLY_ISOTHERMAL)
         choked = (2.0 / (gamma + 1.0)) ** (gamma / (gamma - 1.0))
-        r = max(lower / higher, choked)
-        speed = 2.0 / (gamma - 1.0) * (r ** (2.0 / gamma) - r ** ((gamma + 1.0) / gamma))
+        log_r = np.log1p(-np.minimum(difference / higher, 1.0 - choked))
+        speed = -2.0 / (gamma - 1.0) * np.exp(2.0 / gamma * log_r) * np.expm1((1.0 - 1.0 / gamma) * log_r)
         density = AIR_DENSITY * (higher / self.atmospheric) ** (1.0 / gamma)
-        rate = area * np.sqrt(gamma * density * higher * max(speed, 0.0)) / AIR_DENSITY
-        even = volume * (1.0 + outside / self.atmospheric) ** (1.0 / self.gamma) - reference
-        return float(np.sign(even) * min(rate * dt, abs(even)))
+        return area * np.sqrt(gamma * density * higher * speed) / (AIR_DENSITY * difference)

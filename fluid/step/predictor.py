@@ -333,9 +333,11 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     cushions = None
     if water.air is not None:
         from fluid.air.cushions import Cushions
+        from fluid.air.leaks import Openings
 
         taken = water.coupling @ water.moved_on.ravel()
         cushions = Cushions.of(water.air, t, water.level_set, phi, water.lets_air_out, taken)
+        cushions = cushions.leaking(Openings.of(water, cushions.air.label), dt)
         cushions = cushions.beside(graph, phi, dofs, theta, kick, dt / density)
     kept = Predicted(
         level_set=phi,

@@ -320,7 +320,7 @@ class Water:
         if self.air is not None:
             kept = problem.predicted
             self.air = kept.cushions.after(problem.of_air(x), kept.theta, problem.dt)
-            self._let_air_out(problem.dt)
+            self.air = kept.cushions.leaked(self.air, self.pocket_volumes(), problem.dt)
         self.conserved_volume = problem.predicted.conserved_volume
         if self.slits is not None:
             p = self.parameters
@@ -665,13 +665,6 @@ class Water:
         """Lower and upper corner (2, 3) [m] of the box around the nodes of a pocket, 0 ... K-1."""
         nodes = self.topology.nodes[self.air.label == pocket + 1]
         return np.array([nodes.min(axis=0), nodes.max(axis=0)])
-
-    def _let_air_out(self, dt: float) -> None:
-        """Let air leave the pockets through vents and narrow cracks for dt [s]."""
-        if self.vents or (self.slits is not None and len(self.slits)):
-            from fluid.air.leaks import leaked
-
-            self.air = leaked(self, self.vents, self.pocket_volumes(), dt)
 
     def head(self) -> Array:
         """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""

@@ -310,13 +310,12 @@ def _afloat(reference: float) -> dict[str, float]:
 
 def _sinking() -> float:
     """Time [s] in which the ceiling sinks from HIGH to LOW while the bell's weight drives air out of the orifice."""
-    gas, area = Gas(), BELL[0] ** 2
+    gas = Gas()
     references = [brentq(lambda r, top=top: _afloat(r)["top"] - top, 0.1, 0.6) for top in (HIGH, LOW)]
 
     def slowness(reference):
         here = _afloat(reference)
-        volume = area * (here["top"] + here["pressure"] / (DENSITY * GRAVITY))
-        return 1e-9 / -gas.leaked(reference, volume, 0.0, 0.6 * LEAK, 1e-9)
+        return 1.0 / float(gas.flow(here["pressure"], 0.0, 0.6 * LEAK))
 
     return quad(slowness, references[1], references[0])[0]
 
