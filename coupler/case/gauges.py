@@ -66,7 +66,10 @@ class AirGauge(Section):
 
     kind: Literal["air"] = Field(description="what it measures: a pocket of trapped air")
     name: Name = Field(description="columns of the history")
-    at: Point = Field(description="point (x, y, z); the first pocket at this point is followed from then on")
+    at: Point = Field(
+        description="point (x, y, z); the first pocket at this point is followed from then on; when it is lost, the "
+        "next one found here"
+    )
 
 
 class VelocityGauge(Section):

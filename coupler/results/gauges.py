@@ -151,7 +151,8 @@ def _air(spec, rows_of) -> Gauge:
 
 
 class Followed:
-    """The pocket of air that was first found at a place; it is followed wherever it moves."""
+    """The pocket of air that was first found at a place; it is followed wherever it moves. Where it is lost, the next
+    one that is found at the place takes its turn."""
 
     def __init__(self):
         self.name = 0
@@ -161,12 +162,13 @@ class Followed:
         from fluid.readings.gauges import pocket_at
 
         air = water.air
-        if self.name == 0 and (found := pocket_at(water, place)) is not None:
-            self.name = int(air.name[found])
         there = np.flatnonzero(air.name == self.name)
-        if self.name == 0 or len(there) == 0:
+        k = pocket_at(water, place) if len(there) == 0 else int(there[0])
+        if k is None:
+            self.name = 0
             return np.nan, np.nan
-        return float(air.mean_pressure[there[0]]), float(water.pocket_volumes()[there[0]])
+        self.name = int(air.name[k])
+        return float(air.mean_pressure[k]), float(water.pocket_volumes()[k])
 
     def save(self) -> dict[str, Array]:
         """The state for `restore`."""

@@ -3,10 +3,12 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from coupler.results.gauges import Followed
 from coupler.run.forecast import forecast
 from coupler.run.trapped_air import described_air
 from coupler.scene.build import build
@@ -95,6 +97,23 @@ def test_the_pressure_behind_a_vent_is_that_of_its_orifice_at_any_step(area, ste
     np.testing.assert_allclose(late, 0.5 * AIR_DENSITY * rate**2, rtol=0.02)
     assert record.balance.energy_error < 0.01
     assert coupling.water.air.lost > 0.0
+
+
+def test_a_gauge_reads_the_next_pocket_at_its_place_once_the_first_is_lost():
+    fill = [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.5]}]
+    water = build(case(TRAPPED | {"fill": fill}, tank=CLOSED), no_clock).coupling.water
+    gauge, place, first = Followed(), np.array([1.0, 0.1, 0.8]), water.air
+    np.testing.assert_allclose(gauge.read(water, place), [0.0, 0.2], atol=1e-9)
+    water.air = replace(first, name=np.array([2]), mean_pressure=np.array([50.0]))
+    np.testing.assert_allclose(gauge.read(water, place), [50.0, 0.2])
+    np.testing.assert_array_equal(gauge.read(water, [1.0, 0.1, 0.1]), [50.0, water.pocket_volumes()[0]])
+    label, none = np.where(first.label > 0, 0, first.label), np.zeros(0)
+    water.air = replace(first, label=label, name=none, mean_pressure=none, reference=none)
+    assert np.isnan(gauge.read(water, place)).all()
+    water.air = replace(first, name=np.array([3]))
+    again = Followed()
+    again.restore(gauge.save())
+    assert again.read(water, place) == gauge.read(water, place) == (0.0, water.pocket_volumes()[0])
 
 
 def test_open_air_loads_nothing_of_it():
