@@ -10,11 +10,14 @@ from array_types import Array
 from coupler.verdict.divisions import Division
 
 if TYPE_CHECKING:
+    from fluid.mesh.background import Background
     from fluid.step.water import Water
 
 
 OUTSIDE = 1.5
 """Cells between a body and where its depth is read: the cells that it cuts lie between."""
+HEIGHTS = 5
+"""Heights between the foot and the top of a body at which the size of the cells beside it is taken."""
 
 
 def depths_around(water: Water, bodies: Division, lower: Array, upper: Array) -> tuple[Array, Array]:
@@ -25,7 +28,8 @@ def depths_around(water: Water, bodies: Division, lower: Array, upper: Array) ->
 
     k = len(bodies.names)
     places = [
-        _around(lower[rows], upper[rows], OUTSIDE * water.mesh.spacing) for rows in map(bodies.rows, range(k))
+        _around(lower[rows], upper[rows], OUTSIDE * _cell_beside(water.mesh, lower[rows], upper[rows]))
+        for rows in map(bodies.rows, range(k))
     ]
     low, high = water.mesh.bounds
     body = np.repeat(np.arange(k), [len(p) for p in places])
@@ -38,6 +42,15 @@ def depths_around(water: Water, bodies: Division, lower: Array, upper: Array) ->
         order = np.argsort(found, kind="stable")  # of each body the deepest comes last and stays
         depth[body[order]], at[body[order]] = found[order], place[order]
     return depth, at
+
+
+def _cell_beside(mesh: Background, lower: Array, upper: Array) -> float:
+    """Size [m] of the largest cell at the sides of the box around the blocks, as far as it is in the tank."""
+    low, high = np.clip((lower[:, 2].min(), upper[:, 2].max()), *mesh.bounds[:, 2])
+    place, z = _around(lower, upper, 0.0), np.linspace(low, high, HEIGHTS)
+    return float(
+        mesh.size_at(np.column_stack([np.repeat(place, HEIGHTS, axis=0), np.tile(z, len(place))])).max()
+    )
 
 
 def _around(lower: Array, upper: Array, distance: float) -> Array:
