@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fluid.step.water import Water
 
 LEAST = 1.0
-"""Volume, in h³, from which a part counts: those between stacked blocks are many and small."""
+"""Volume from which a part counts, in cells of its place (h³): those between stacked blocks are many and small."""
 
 
 class ClosedOff(NamedTuple):
@@ -35,9 +35,10 @@ def closed_off(water: Water) -> list[ClosedOff]:
     has_air = np.zeros(count, bool)
     has_air[part[breathes[t.cells].any(axis=1)]] = True
     volume = np.bincount(part, t.volume, count)
+    in_cells = np.bincount(part, t.volume / water.mesh.local_size[t.background] ** 3, count)
     middle = t.nodes[t.cells].mean(axis=1)
     found = []
-    for k in np.flatnonzero(~has_air & (volume > LEAST * water.mesh.spacing**3)):
+    for k in np.flatnonzero(~has_air & (in_cells > LEAST)):
         own = part == k
         found.append(ClosedOff(float(volume[k]), np.average(middle[own], axis=0, weights=t.volume[own])))
     return sorted(found, key=lambda one: -one.volume)

@@ -7,6 +7,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.covers import OPENINGS
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
+from fluid.mesh.refinement import InBox, refined_mesh
 from fluid.readings.closed_off import closed_off
 from fluid.step.water import Water
 
@@ -39,3 +40,21 @@ def test_thresholds_of_the_covers_close_narrow_openings():
     assert closed_off(tank(gap=0.02)) == []
     (found,) = closed_off(tank(gap=0.02, openings="wide"))
     assert found.volume == pytest.approx(0.94 * 0.5 * 0.5, rel=0.05)
+
+
+def test_a_chamber_in_fine_cells_of_a_large_tank_is_found():
+    """It is a third of a mean cell of the tank and 57 of those around it: it was taken for a gap between blocks."""
+    inner, wall = 0.12, 0.05
+    boxes = []
+    for k in range(3):
+        for side in (-0.5, 0.5):
+            middle, size = np.full(3, 0.5), np.full(3, inner + 2.0 * wall)
+            middle[k] += side * (inner + wall)
+            size[k] = wall
+            boxes.append((middle, size))
+    bodies = ConvexBodies.boxes(*map(np.array, zip(*boxes)))
+    mesh = refined_mesh(box_mesh((0, 0, 0), (8, 8, 1), 0.25), [InBox((0.3, 0.3, 0.3), (0.7, 0.7, 0.7), 3)])
+    assert inner**3 < mesh.spacing**3
+    (found,) = closed_off(Water(mesh, cut_domain(mesh, bodies, "multiple"), lambda x: x[:, 2] - 0.85))
+    assert found.volume == pytest.approx(inner**3, rel=1e-6)
+    np.testing.assert_allclose(found.place, 0.5, atol=1e-6)
