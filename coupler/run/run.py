@@ -169,6 +169,8 @@ def _steps(
                 recorder.step(record)
             _note(coupling, record, figures)
             _note_top(case, recorder, coupling, figures, reporter)
+            if coupling.water is not None and coupling.water.air is not None:
+                _note_air(coupling, figures, reporter)
             reporter.expect(*_calm_and_broken(calm, fall, coupling, record))
             reporter.step(coupling.time, _reported(case, coupling, record, scene.watch))
             if each is not None:
@@ -213,6 +215,15 @@ def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter)
         reporter.message(f"note: {reached(found)}")
 
 
+def _note_air(coupling, figures: dict, reporter) -> None:
+    """Record in the figures which pockets opened to the atmosphere, and report them unless larger ones were."""
+    from coupler.run.trapped_air import note_opened
+
+    message = note_opened(coupling.water, coupling.time, figures)
+    if message:
+        reporter.message(message)
+
+
 def _report_verdict(
     case: Case, reported: dict | None, figures: dict, directory, reporter, is_coupled: bool
 ) -> None:
@@ -221,6 +232,10 @@ def _report_verdict(
 
     doubts = [*thin_remarks(case), *thin_water_remarks(case)]
     doubts += [in_all(figures["tank_top"])] if "tank_top" in figures else []
+    if "air_opened" in figures:
+        from coupler.run.trapped_air import opened_in_all
+
+        doubts.append(opened_in_all(figures["air_opened"]))
     if reported is not None and is_coupled and figures["steps"]:
         doubts += filter(None, [unreached(reported, figures["time"])])
     directory.record(doubts=doubts)

@@ -47,6 +47,16 @@ RESOLVED, SETTLING = 0.5, 1.0
 """θ_k of (2)."""
 
 
+@dataclass(frozen=True)
+class Opened:
+    """A pocket, or a part of one, that the open air has reached: place (3,) [m] of the middle of its nodes · volume
+    [m³] and gauge pressure [Pa] before."""
+
+    place: Array
+    volume: float
+    pressure: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Air:
     """State of the K pockets between two steps, in the order of their labels.
@@ -57,7 +67,7 @@ class Air:
     from 1 · names: how many have been given · lost [J]: energy so far of air that escaped or was mixed, or of bubbles
     that were released · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets
     that the water has filled so far · let_go: pockets released so far because they became too small
-    (`Gas.smallest`)."""
+    (`Gas.smallest`) · opened: those that the open air has reached in the last step."""
 
     gas: Gas
     label: Array
@@ -72,6 +82,7 @@ class Air:
     entrained: float = 0.0
     gone: int = 0
     let_go: int = 0
+    opened: tuple[Opened, ...] = ()
 
     @classmethod
     def at_start(cls, gas: Gas, topology, phi, lets_air_out) -> Air:
@@ -149,6 +160,7 @@ class Cushions:
         before_volume = air.volumes(t, before, taken)
         label, count = labelled(t, phi, lets_air_out)
         descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
+        opened = _opened(air, before_volume, descent, label, t.nodes)
         small = reference < gas.smallest * bricks(t, label, count)
         let_go = air.let_go
         if small.any():
@@ -174,6 +186,7 @@ class Cushions:
             entrained=air.entrained + float(reference[out_of_water].sum()),
             gone=air.gone + int(descent.gone.sum()),
             let_go=let_go,
+            opened=opened,
         )
         theta = np.where(now.turned, SETTLING, RESOLVED)
         stiffness = gas.stiffness(reference, volume)
@@ -324,6 +337,16 @@ def _handed_on(air: Air, before, topology, phi, label, count: int):
     if anew.any():
         volume[anew] = reference[anew] = volumes(topology, phi, label, count)[anew]
     return descent, reference, volume
+
+
+def _opened(air: Air, before, descent: Descent, label, nodes) -> tuple[Opened, ...]:
+    """What the open air reaches now of the old pockets with volumes (O,) [m³]; label (N,) of the air now."""
+    out = []
+    pressure = air.gas.pressure(air.reference, before)
+    for k in np.flatnonzero(descent.opened > 0.0):
+        place = nodes[(air.label == k + 1) & (label == OPEN_AIR)].mean(axis=0)
+        out.append(Opened(place, float(descent.opened[k] * before[k]), float(pressure[k])))
+    return tuple(out)
 
 
 def _of_parent(values, only):

@@ -4,15 +4,21 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from coupler.checks.read_case import load
 from coupler.results.gauges import Followed
+from coupler.run.directory import RunDirectory
+from coupler.run.execute import execute_case
 from coupler.run.forecast import forecast
-from coupler.run.trapped_air import described_air
+from coupler.run.summary import read_summary
+from coupler.run.trapped_air import described_air, note_opened, opened_in_all
 from coupler.scene.build import build
 from coupler.step.limits import Diverged, check_air
+from fluid.air.cushions import Opened
 from fluid.air.gas import AIR_DENSITY
 from tests.coupler.water_cases import FILL, case, reported, run
 from tests.fakes import no_clock
@@ -114,6 +120,88 @@ def test_a_gauge_reads_the_next_pocket_at_its_place_once_the_first_is_lost():
     again = Followed()
     again.restore(gauge.save())
     assert again.read(water, place) == gauge.read(water, place) == (0.0, water.pocket_volumes()[0])
+
+
+LIFTED = """
+[case]
+title = "a bell is lifted out of the water"
+[time]
+end = "0.2 s"
+[tank]
+lower = [0, 0, 0]
+upper = [2, 0.2, 1.4]
+cell = 0.1
+[water]
+covers = "multiple"
+[water.air]
+model = "trapped"
+[[water.fill]]
+lower = [0, 0, 0]
+upper = [2, 0.2, 0.52]
+[limits]
+energy_error = 0.5
+[contact]
+stiffness = "40 MN/m"
+[[structure.block]]
+name = "left"
+centre = [0.6, 0.1, 0.65]
+size = [0.1, 0.2, 0.3]
+[[structure.block]]
+name = "right"
+centre = [1.4, 0.1, 0.65]
+size = [0.1, 0.2, 0.3]
+[[structure.block]]
+name = "roof"
+centre = [1.0, 0.1, 0.85]
+size = [0.9, 0.2, 0.1]
+[[motion]]
+block = "left"
+velocity = [0, 0, 0.4]
+[[motion]]
+block = "right"
+velocity = [0, 0, 0.4]
+[[motion]]
+block = "roof"
+velocity = [0, 0, 0.4]
+"""
+
+
+def test_a_run_tells_where_a_pocket_opens_to_the_atmosphere(tmp_path):
+    (tmp_path / "case.toml").write_text(LIFTED)
+    file = load(tmp_path)
+    run = RunDirectory.create(file, tmp_path / "run")
+    assert execute_case(file, run, quiet=True) == 0
+    log, figures = (run.path / "log.txt").read_text(), read_summary(run.path)["figures"]
+    found = figures["air_opened"]
+    assert found["number"] == 1
+    assert 0.0 < found["time"] < 0.15
+    np.testing.assert_allclose(found["place"], [1.0, 0.1, 0.7], atol=0.15)
+    assert found["largest"] == pytest.approx(0.7 * 0.2 * 0.28, rel=0.4)
+    assert f"note: {opened_in_all(found)}" in log
+    assert f"but: {opened_in_all(found)}" in log
+    assert figures["doubts"] == [opened_in_all(found)]
+    assert "opened to the atmosphere and lost its air" in log
+    assert "under a lip that is less than a cell (100 mm) under water" in log
+
+
+def test_pockets_that_open_are_told_again_only_when_they_are_larger():
+    figures, mesh = {}, SimpleNamespace(size_at=lambda points: np.array([0.1]))
+
+    def told(time, *volumes):
+        opened = tuple(Opened(np.array([1.0, 2.0, 3.0]), volume, 1500.0) for volume in volumes)
+        air = SimpleNamespace(opened=opened)
+        return note_opened(SimpleNamespace(air=air, mesh=mesh), time, figures)
+
+    assert told(0.1) == ""
+    assert figures == {}
+    assert told(0.2, 0.01).startswith(
+        "note: at t = 0.2 s a pocket of trapped air around (1, 2, 3) m, 0.01 m3 at 1.5 kPa"
+    )
+    assert told(0.3, 0.015, 0.005) == ""
+    assert told(0.4, 0.03).startswith("note: at t = 0.4 s")
+    assert opened_in_all(figures["air_opened"]).startswith(
+        "4 times a pocket of trapped air opened to the atmosphere, 0.06 m3 in all. The largest: at t = 0.4 s"
+    )
 
 
 def test_open_air_loads_nothing_of_it():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from fluid.air.cushions import Cushions
 from fluid.air.gas import AIR_DENSITY, Gas
 from fluid.air.leaks import Openings, Vent, pockets_at
 from fluid.air.pockets import NO_AIR, OPEN_AIR, Descent, bricks, labelled, volumes
@@ -221,6 +222,20 @@ def test_a_body_in_a_closed_tank_full_of_air_and_water_feels_no_force_from_the_p
     np.testing.assert_allclose(problem.of_water(compliance), 0.0, atol=1e-12 * abs(problem.matrix).max())
     difference = abs(problem.matrix - problem.matrix.T)
     assert difference.max() <= 1e-14 * abs(problem.matrix).max()
+
+
+def test_a_pocket_that_the_open_air_reaches_says_where_and_what_it_was():
+    water, held, volume, _ = bell(0.3, 0.93, 1.37)
+    nothing, below = np.zeros(len(water.level_set)), water.topology.nodes[:, 2] - 0.2
+    kept = Cushions.of(
+        water.air, water.topology, water.level_set, water.level_set, water.lets_air_out, nothing
+    )
+    assert kept.air.opened == ()
+    opened = Cushions.of(water.air, water.topology, water.level_set, below, water.lets_air_out, nothing).air
+    assert len(opened) == 0
+    (found,) = opened.opened
+    np.testing.assert_allclose([found.volume, found.pressure], [volume[0], held], rtol=1e-6)
+    np.testing.assert_allclose(found.place, [0.99, 0.99, 1.3], atol=0.1)
 
 
 # ---- in motion
