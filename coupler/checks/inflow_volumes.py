@@ -58,7 +58,7 @@ def _filled_up(case: Case) -> Iterator[Problem]:
     room = room_beside(tank, case.water.fill)
     for i, spec in enumerate(case.water.inflow):
         ways = [side for side in (*tank.open, *seas) if side[0] in "xy"]
-        if spec.absorbs or "z-" in tank.open or _opposite(spec.side) in ways:
+        if spec.absorbs or "z-" in tank.open or opposite(spec.side) in ways:
             continue
         entered = _Entered.of(case, spec)
         rate = sum(_over_the_edge(case, side, max(tank.upper[2], entered.highest)) for side in ways)
@@ -81,7 +81,7 @@ def _over_its_crest(case: Case, i: int, spec, entered: _Entered) -> Iterator[Pro
     although open sides beside its way let out what runs over an edge: the surface at its side is given, and the water
     of the tank would fall into the trough there."""
     tank = case.tank
-    if _opposite(spec.side) in tank.open or (spec.kind == "bore" and spec.ahead is None):
+    if opposite(spec.side) in tank.open or (spec.kind == "bore" and spec.ahead is None):
         return
     highest, name = entered.highest, "what the far side throws back"
     if spec.kind == "bore":
@@ -236,7 +236,8 @@ def _thrown_back(depth: float, speed: float, gravity: float) -> float:
     return max(math.sqrt(depth) + 0.5 * speed / math.sqrt(gravity), 0.0) ** 2
 
 
-def _opposite(side: str) -> str:
+def opposite(side: str) -> str:
+    """The side of the tank across from one: x- for x+."""
     return side[0] + ("+" if side[1] == "-" else "-")
 
 

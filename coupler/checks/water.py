@@ -12,7 +12,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.types import KeyPath, Problem
-from coupler.checks.inflow_volumes import depth_behind, inflow_volume_problems
+from coupler.checks.inflow_volumes import depth_behind, inflow_volume_problems, opposite
 from coupler.geometry.cell_sizes import edges_at, has_equal_cells, places_in_box, widest_cell
 from coupler.geometry.stretches import axes_of
 from coupler.geometry.tank_mesh import floor_along, is_measured, mean_bed
@@ -41,6 +41,9 @@ LEAST_DROP = 2.5
 
 STILL = 0.1
 """Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
+
+RISES = 0.1
+"""Share of a cell by which a stream may raise the level of a sea that absorbs, without a remark."""
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
@@ -72,9 +75,10 @@ def water_problems(case: Case) -> Iterator[Problem]:
 
 
 def water_remarks(case: Case) -> Iterator[str]:
-    """Water that the mesh does not resolve, waves that are under way at the start, and waves without the still water
-    that they run into."""
+    """Water that the mesh does not resolve, streams that raise the level of a sea, waves that are under way at the
+    start, and waves without the still water that they run into."""
     yield from thin_water_remarks(case)
+    yield from _streams_into_absorbing_seas(case)
     for spec in case.water.inflow if case.water and case.tank else ():
         if spec.kind in ("solitary", "n-wave") or getattr(spec, "ahead", None) is not None:
             yield from _still_water(case, spec)
@@ -189,6 +193,38 @@ def _still_water(case: Case, spec) -> Iterator[str]:
             f"the {spec.kind.replace('solitary', 'solitary wave')} at {spec.side} runs into still water up to "
             f"z = {wanted:g} m, but [[water.fill]] reaches z = {there:g} m beside it: this step would collapse at once"
         )
+
+
+def _streams_into_absorbing_seas(case: Case) -> Iterator[str]:
+    """Steady inflows opposite to a sea that absorbs. What runs out there counts as a wave into still water, with
+    sqrt(g h) = sqrt(g h_sea) + u/2 (Stoker 1957, 10.2), so that the water stands higher than the sea for good."""
+    if case.tank is None or case.water is None or not case.tank.is_box:
+        return
+    gravity = case.case.gravity
+    for spec in case.water.inflow:
+        if spec.kind != "steady" or spec.velocity <= 0.0 or spec.absorbs:
+            continue
+        for i, sea in enumerate(case.water.sea):
+            if not sea.absorbs or sea.side != opposite(spec.side):
+                continue
+            still = _depth(case, sea)
+            rise = _level_of_stream(still, spec.velocity * _depth(case, spec), gravity) - still
+            if rise > RISES * case.tank.cell:
+                yield (
+                    f"the steady stream from {spec.side} leaves by the sea at {sea.side} as an outgoing wave into "
+                    f"still water would, since water.sea[{i}].absorbs = true: the level there rises by about "
+                    f"{rise:.2g} m above that of the sea and stays there; with absorbs = false it keeps its level"
+                )
+
+
+def _level_of_stream(still: float, discharge: float, gravity: float) -> float:
+    """Depth [m] at which a discharge per width [m²/s] is that of an outgoing wave into still water of a depth [m]."""
+    low, high = still, still + discharge / math.sqrt(gravity * still)
+    for _ in range(60):
+        depth = 0.5 * (low + high)
+        taken = 2.0 * (math.sqrt(gravity * depth) - math.sqrt(gravity * still)) * depth
+        low, high = (depth, high) if taken < discharge else (low, depth)
+    return high
 
 
 def _depth(case: Case, spec) -> float:

@@ -460,3 +460,23 @@ def test_a_sea_whose_tide_cannot_be_read_beside_a_full_tank_is_refused_for_its_t
     sea = [{"side": "x+", "level": 0.7, "tide": {"path": "nowhere.csv"}}]
     found = problems(case({"fill": full, "sea": sea}, tank=TANK | {"open": []}))
     assert [path for path, _ in found] == [("water", "sea", 0, "tide", "path")]
+
+
+def test_a_steady_stream_into_a_sea_that_absorbs_is_told_to_raise_its_level():
+    """Water 0.4 m deep at 0.2 m/s: a run stands at 0.4366 to 0.4376 m, by the invariants of long waves 0.4378 m."""
+
+    def told(sea, velocity=0.2, **inflow):
+        water = {
+            "fill": [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.4]}],
+            "inflow": [{"kind": "steady", "side": "x-", "level": 0.4, "velocity": velocity, **inflow}],
+            "sea": [{"side": "x+", "level": 0.4, **sea}],
+        }
+        return [text for text in remarks(case(water)) if "stream" in text]
+
+    (found,) = told({"absorbs": True})
+    assert (
+        "water.sea[0].absorbs = true: the level there rises by about 0.038 m above that of the sea" in found
+    )
+    assert told({"absorbs": False}) == told({"absorbs": True}, velocity=0.02) == []
+    assert told({"absorbs": True}, velocity=-0.2) == told({"absorbs": True}, absorbs=True) == []
+    assert told({"side": "y+", "absorbs": True}) == []
