@@ -238,8 +238,8 @@ def town_remarks(case: Case) -> Iterator[str]:
         if silent:
             yield (
                 f"structure.town[{i}]: {len(silent)} of {len(known)} footprints say nothing under "
-                f"'{town.storeys_from}' (the first is feature {silent[0].number}): they get storeys = {town.storeys}, or what "
-                "a rule says"
+                f"'{town.storeys_from}' (the first is feature {silent[0].number}): they get storeys = {town.storeys}, "
+                "or what a rule says"
             )
         for k, rule in enumerate(town.rule):
             values = {f.attributes[rule.attribute] for f in known if rule.attribute in f.attributes}
