@@ -97,7 +97,8 @@ ALWAYS = {
     "steps at most. With all cells counted alike in the pressure beyond the surface "
     "([theory](theory.md#22-step)) it lies between 0 and −93 Pa (median −8, below −50 in four), which 18 "
     "runs do not tell apart (p = 0.16, rank test).",
-    "P61": "In an earlier version, with the island moved by 0, 1, −1 and 10 mm along the wave (cells at the shore are 8 cm wide) the "
+    "P61": "In an earlier version, with the island moved by 0, 1, −1 and 10 mm along the wave (cells at the shore "
+    "are 8 cm wide) the "
     "run-up is 0.080, 0.078, 0.091 and 0.080 m facing the wave and 0.078, 0.090, 0.083 and 0.079 m in the "
     "lee; with all cells counted alike in the pressure beyond the surface ([theory](theory.md#22-step)) "
     "0.079, 0.077, 0.071 and 0.077 m, and 0.091, 0.093, 0.073 and 0.080 m. So small a change decides about "
