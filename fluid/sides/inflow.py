@@ -280,6 +280,23 @@ class Sides:
         self.left -= float(volume[volume < 0.0].sum())
         self.energy += float(volume @ head) + ahead
 
+    def given(self, phi, velocities, mass, impulse) -> float:
+        """What a change of the velocity of inflows adds to the energy that comes in [J]: that of the water at their
+        nodes, half a cell, which is given its velocity without a force, less half of the work of the pressure on the
+        change, since it acts while the velocity changes,
+
+            ½ Σ M_i Δ|u_i|² - ½ Σ dt p_i Δq_i.
+
+        phi (N,) [m] · velocities (N, 3) [m/s] before and after a step dt · mass M (N,) [kg] · impulse dt p (N,)
+        [Pa s]."""
+        at = self.flowing()
+        before, after = (u[at] for u in velocities)
+        if np.array_equal(before, after):
+            return 0.0
+        gained = 0.5 * float(mass[at] @ ((after**2).sum(axis=1) - (before**2).sum(axis=1)))
+        rates = [float(self.flow_rate(phi, u) @ impulse) for u in velocities]
+        return gained - 0.5 * (rates[1] - rates[0])
+
     def flowing(self) -> Array:
         """Nodes (n,) of the inflows."""
         found = [side.nodes for side in self.now if not side.is_sea]

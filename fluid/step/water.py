@@ -306,7 +306,14 @@ class Water:
         new: Corrected = corrected(self, problem, np.asarray(x), parting)
         late = self._late(problem.dt)
         before = self._rates() if late > 0.0 else None
-        given = 0.0 if self.sides is None else self._given_to_flows(new, problem)
+        given = 0.0
+        if self.sides is not None:
+            given = self.sides.given(
+                problem.predicted.level_set,
+                (self.velocity, new.velocity),
+                problem.density * new.nodal_water,
+                problem.dt * new.pressure,
+            )
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
         self.displaced = problem.predicted.displaced
         self.film_volume, self.film_potential = problem.predicted.in_films
@@ -342,21 +349,6 @@ class Water:
         self.time += problem.dt
         self.steps += 1
         self._domain_is_new, self.renumbered, self.left_behind = False, None, None
-
-    def _given_to_flows(self, new, problem) -> float:
-        """What the change of the velocity of inflows adds to the energy that comes in [J]: that of the water at their
-        nodes, half a cell, which is given its velocity without a force, less half of the work of the pressure on the
-        change, since it acts while the velocity changes,
-
-            ½ ρ Σ W_i Δ|u_i|² - ½ dt Σ p_i Δq_i.
-        """
-        at, phi = self.sides.flowing(), problem.predicted.level_set
-        if len(at) == 0 or np.array_equal(new.velocity[at], self.velocity[at]):
-            return 0.0
-        water, density = new.nodal_water[at], self.parameters.density
-        gained = [kinetic_energy(density, water, u[at]) for u in (self.velocity, new.velocity)]
-        rates = [self.sides.flow_rate(phi, u) @ new.pressure for u in (self.velocity, new.velocity)]
-        return gained[1] - gained[0] - 0.5 * problem.dt * float(rates[1] - rates[0])
 
     def _late(self, dt: float) -> float:
         """By how much [s] the velocity that a step of dt [s] adds is ahead of the surface.

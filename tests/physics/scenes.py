@@ -18,6 +18,7 @@ from yade_scripts.joints.cohesion import JointParameters
 G, RHO = 9.81, 1000.0
 SLICE = 0.5
 """Width of the tank of the walls [m]."""
+STIFF_CONTACT = {"stiffness": 2e9, "friction": 0.4, "restitution": 0.3}
 OVERHANG = 0.001
 """The walls reach beyond the tank in y, so that its sides neither hold them nor let water past."""
 
@@ -98,3 +99,33 @@ def run(coupling, end, each=lambda record: None):
 def case(**sections) -> Case:
     """A case of plain data, checked by the schema."""
     return Case.model_validate({"case": {"title": "a test"}, **sections})
+
+
+def wall_with_uplift(uplift):
+    """Sections of a case: a wall of four blocks, joined to one another and to the bed, before 2.2 m of still water
+    that reaches up to its face, with air behind it."""
+    return {
+        "time": {"end": 1.0, "step_max": 1 / 30},
+        "tank": {"lower": [0, 0, 0], "upper": [6, 1, 5], "cell": 0.2},
+        "water": {"fill": [{"lower": [0, 0, 0], "upper": [3.1, 1, 2.2]}]},
+        "structure": {
+            "density": 2000.0,
+            "wall": [{"name": "wall", "lower": [3.1, 0, 0], "size": [0.6, 1, 4], "block": [0.6, 1, 1]}],
+        },
+        "joints": {"strength": 2e5, "opening_at_failure": 1e-3, "uplift": uplift},
+        "contact": {"friction": 0.5},
+    }
+
+
+def block_in_a_pool(centre, height, top):
+    """Sections of a case: a loose block, 2 m x 2 m, on the bed of a pool 3 m deep in a tank of the height `top` [m]."""
+    return {
+        "time": {"end": 4.0, "step_max": 0.05},
+        "tank": {"lower": [0, 0, 0], "upper": [8, 6, top], "cell": 0.5},
+        "water": {"fill": [{"lower": [0, 0, 0], "upper": [8, 6, 3]}]},
+        "structure": {
+            "density": 2400.0,
+            "block": [{"name": "block", "centre": [*centre, 0.5 * height], "size": [2, 2, height]}],
+        },
+        "contact": STIFF_CONTACT,
+    }

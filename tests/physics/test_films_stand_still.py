@@ -5,7 +5,7 @@ import pytest
 
 from coupler.scene.build import build
 from tests.fakes import no_clock
-from tests.physics.scenes import RHO, G, case
+from tests.physics.scenes import RHO, G, block_in_a_pool, case, wall_with_uplift
 
 
 def stepped(end, **sections):
@@ -22,18 +22,7 @@ def stepped(end, **sections):
 def test_no_water_comes_through_the_joint_under_a_wall(uplift):
     """It squirted out of the film at the dry foot with all of the head, and the surface went with it: 0.06 m³ a second
     stood up behind the wall, taken from the basin."""
-    coupling = stepped(
-        1.0,
-        time={"end": 1.0, "step_max": 1 / 30},
-        tank={"lower": [0, 0, 0], "upper": [6, 1, 5], "cell": 0.2},
-        water={"fill": [{"lower": [0, 0, 0], "upper": [3.1, 1, 2.2]}]},
-        structure={
-            "density": 2000.0,
-            "wall": [{"name": "wall", "lower": [3.1, 0, 0], "size": [0.6, 1, 4], "block": [0.6, 1, 1]}],
-        },
-        joints={"strength": 2e5, "opening_at_failure": 1e-3, "uplift": uplift},
-        contact={"friction": 0.5},
-    )
+    coupling = stepped(1.0, **wall_with_uplift(uplift))
     water = coupling.water
     behind = water.topology.nodes[:, 0] > 3.79
     assert water.nodal_water[behind].sum() < 1e-6
@@ -43,14 +32,7 @@ def test_no_water_comes_through_the_joint_under_a_wall(uplift):
 def test_still_water_stays_still_beside_a_loose_block_against_a_side():
     """The film between block and side ends in the surface: the motion of its water fed a sway of the pool that grew
     from 0.01 to 0.8 J within seconds."""
-    coupling = stepped(
-        4.0,
-        time={"end": 4.0, "step_max": 0.05},
-        tank={"lower": [0, 0, 0], "upper": [8, 6, 5], "cell": 0.5},
-        water={"fill": [{"lower": [0, 0, 0], "upper": [8, 6, 3]}]},
-        structure={"density": 2400.0, "block": [{"name": "block", "centre": [4, 1, 2], "size": [2, 2, 4]}]},
-        contact={"stiffness": 2e9, "friction": 0.4, "restitution": 0.3},
-    )
+    coupling = stepped(4.0, **block_in_a_pool((4, 1), 4, 5))
     assert coupling.water.kinetic_energy() < 1e-4
     assert coupling.water.pressure.max() == pytest.approx(3.0 * RHO * G, rel=1e-3)
     assert np.abs(coupling.structure.velocity()).max() < 1e-4

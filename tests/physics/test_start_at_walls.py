@@ -5,9 +5,7 @@ import pytest
 
 from coupler.scene.build import build
 from tests.fakes import no_clock
-from tests.physics.scenes import RHO, G, case
-
-CONTACT = {"stiffness": 2e9, "friction": 0.4, "restitution": 0.3}
+from tests.physics.scenes import RHO, STIFF_CONTACT, G, block_in_a_pool, case, wall_with_uplift
 
 
 def loads(steps=4, **sections):
@@ -29,7 +27,7 @@ def test_a_loose_wall_that_ends_on_planes_of_nodes_has_its_thrust_at_once():
         tank={"lower": [0, 0, 0], "upper": [12, 1, 4.5], "cell": 0.25},
         water={"fill": [{"lower": [0, 0, 0], "upper": [5, 1, 3]}, {"lower": [7, 0, 0], "upper": [12, 1, 1]}]},
         structure={"density": 2400.0, "block": [{"name": "quay", "centre": [6, 0.5, 2], "size": [2, 1, 4]}]},
-        contact=CONTACT,
+        contact=STIFF_CONTACT,
     )
     assert found[:, 0] == pytest.approx(0.5 * RHO * G * (3.0**2 - 1.0), rel=0.025)
 
@@ -37,17 +35,7 @@ def test_a_loose_wall_that_ends_on_planes_of_nodes_has_its_thrust_at_once():
 def test_a_joined_wall_that_settles_has_its_thrust_at_once():
     """The wall leans as it settles and its heel opens by a fifth of a millimetre. With the surface in this wedge, the
     first steps had 40, 160 and 80 % of the thrust."""
-    found = loads(
-        time={"end": 1.0, "step_max": 1 / 30},
-        tank={"lower": [0, 0, 0], "upper": [6, 1, 5], "cell": 0.2},
-        water={"fill": [{"lower": [0, 0, 0], "upper": [3.1, 1, 2.2]}]},
-        structure={
-            "density": 2000.0,
-            "wall": [{"name": "wall", "lower": [3.1, 0, 0], "size": [0.6, 1, 4], "block": [0.6, 1, 1]}],
-        },
-        joints={"strength": 2e5, "opening_at_failure": 1e-3, "uplift": "full"},
-        contact={"friction": 0.5},
-    )
+    found = loads(**wall_with_uplift("full"))
     assert found[:, 0] == pytest.approx(0.5 * RHO * G * 2.2**2, rel=0.01)
 
 
@@ -55,14 +43,5 @@ def test_a_joined_wall_that_settles_has_its_thrust_at_once():
 def test_water_gets_under_a_block_as_high_as_its_tank(height):
     """Its weight less that of the water: reaching from floor to top counted as reaching from side to side, which closes
     the faces along both, and the block had no uplift at all."""
-    found = loads(
-        time={"end": 1.0, "step_max": 0.05},
-        tank={"lower": [0, 0, 0], "upper": [8, 6, 4], "cell": 0.5},
-        water={"fill": [{"lower": [0, 0, 0], "upper": [8, 6, 3]}]},
-        structure={
-            "density": 2400.0,
-            "block": [{"name": "block", "centre": [4, 3, 0.5 * height], "size": [2, 2, height]}],
-        },
-        contact=CONTACT,
-    )
+    found = loads(**block_in_a_pool((4, 3), height, 4))
     assert found[1:, 1] == pytest.approx(RHO * G * 3.0 * 4.0, rel=0.01)
