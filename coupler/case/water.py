@@ -69,6 +69,12 @@ class SteadyInflow(Section):
         'kind = "bore"'
     )
     absorbs: Switch = ABSORBS
+    keeps: Literal["level", "discharge"] = Field(
+        "level",
+        description="what stays as given where the water behind the side backs up or falls away, level or discharge "
+        "(level above the bed times velocity); with discharge the level follows the water behind it, as at the "
+        "upstream end of a river",
+    )
 
 
 class RecordInflow(Section):

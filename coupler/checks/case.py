@@ -83,7 +83,7 @@ def remarks(case: Case) -> list[str]:
         *_drawing_remarks(case),
     ]
     found += mesh_remarks(case.tank) if case.tank is not None else []
-    return [*found, *unit_remarks(case), *_window_remarks(case)]
+    return [*found, *unit_remarks(case), *_window_remarks(case), *_patch_remarks(case)]
 
 
 def _drawing_remarks(case: Case) -> Iterator[str]:
@@ -223,6 +223,29 @@ def _window_remarks(case: Case) -> Iterator[str]:
         window = getattr(gauge, "impulse", None)
         if window is not None and window[0] >= case.time.end:
             yield f"gauge '{gauge.name}' begins to add up at {window[0]:g} s, after the end ({case.time.end:g} s)"
+
+
+def _patch_remarks(case: Case) -> Iterator[str]:
+    """Patches for a flow of which a large part lies outside the tank, as if `at` were a corner."""
+    if case.tank is None:
+        return
+    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+    along = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    for gauge in case.gauge:
+        if gauge.kind != "flux":
+            continue
+        points = np.asarray(gauge.at) + along @ np.asarray(gauge.edges)
+        outside = ((points < case.tank.lower) | (points > case.tank.upper)).any(axis=1).mean()
+        if outside > MUCH_OUTSIDE:
+            yield (
+                f"{100.0 * outside:.0f} % of the patch of gauge '{gauge.name}' lies outside the tank, where nothing "
+                f"flows; its key at is the centre of the patch, not a corner"
+            )
+
+
+SAMPLES, MUCH_OUTSIDE = 64, 0.4
+"""Points along an edge of a patch at which its place is looked up, and the share of it outside the tank from which on
+this is said: a patch that is larger than the opening it measures is common, one that is half outside is not."""
 
 
 # ---------------------------------------------------------------- sections

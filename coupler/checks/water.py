@@ -16,7 +16,14 @@ from coupler.checks.inflow_volumes import depth_behind, inflow_volume_problems, 
 from coupler.geometry.cell_sizes import edges_at, has_equal_cells, places_in_box, widest_cell
 from coupler.geometry.stretches import axes_of
 from coupler.geometry.tank_mesh import floor_along, is_measured, mean_bed
-from coupler.scene.build_water import SLACK, fills_beside, level_at_start, sea_level
+from coupler.scene.build_water import (
+    SLACK,
+    fills_beside,
+    follows_inside,
+    keeps_discharge,
+    level_at_start,
+    sea_level,
+)
 
 UPWARDS = np.array([0.0, 0.0, 1.0])
 HIGHEST_WAVE = 0.78
@@ -210,10 +217,17 @@ def _streams_into_absorbing_seas(case: Case) -> Iterator[str]:
             still = _depth(case, sea)
             rise = _level_of_stream(still, spec.velocity * _depth(case, spec), gravity) - still
             if rise > RISES * case.tank.cell:
+                beside = (
+                    ""
+                    if keeps_discharge(spec)
+                    else f", and the water stands above its level at {spec.side}, which keeps it and so gives the water "
+                    'energy; let the inflow follow the water with keeps = "discharge"'
+                )
                 yield (
                     f"the steady stream from {spec.side} leaves by the sea at {sea.side} as an outgoing wave into "
                     f"still water would, since water.sea[{i}].absorbs = true: the level there rises by about "
-                    f"{rise:.2g} m above that of the sea and stays there; with absorbs = false it keeps its level"
+                    f"{rise:.2g} m above that of the sea and stays there (with absorbs = false it keeps its level)"
+                    f"{beside}"
                 )
 
 
@@ -305,14 +319,31 @@ def _sides(case: Case) -> Iterator[Problem]:
             taken[spec.side] = f"water.{kind}[{i}]"
             wrong = list(_levels(case, path, spec))
             yield from wrong
+            if kind == "inflow" and keeps_discharge(spec):
+                yield from _discharge(path, spec)
             if wrong or not case.tank.is_box:
                 continue
-            if spec.absorbs or (kind == "sea" and not _stands_beside(case, spec)):
+            if follows_inside(spec) or (kind == "sea" and not _stands_beside(case, spec)):
                 yield from _across(case.tank, path, spec)
 
 
+def _discharge(path: KeyPath, spec) -> Iterator[Problem]:
+    """An inflow that keeps its discharge brings water, all of it."""
+    if spec.absorbs:
+        yield (
+            (*path, "keeps"),
+            '"discharge", but absorbs = true takes a part of the discharge back; leave one of them out',
+        )
+    if spec.velocity <= 0.0:
+        yield (
+            (*path, "keeps"),
+            f'"discharge" is for water that enters, but velocity is {spec.velocity:g} m/s: take a positive velocity, '
+            'or keeps = "level"',
+        )
+
+
 def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
-    """A side that absorbs reads the water a cell inside, and a sea pushes water into dry cells beside it: the side
+    """A side that absorbs or keeps its discharge reads the water a cell inside, and a sea pushes water into dry cells beside it: the side
     opposite to them must not be the next but one."""
     axis = "xyz".index(spec.side[0])
     cells = _cells_across(tank, axis)
@@ -320,9 +351,10 @@ def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
         return
     where = f"the side opposite to {spec.side} is only {cells} cells away"
     wider = f"at least {LEAST_ACROSS} are needed; take a tank that is wider in {spec.side[0]}, or finer cells"
-    if spec.absorbs:
+    if follows_inside(spec):
+        key, value = ("keeps", '"discharge"') if keeps_discharge(spec) else ("absorbs", "true")
         reads = "the side reads the water a cell inside"
-        yield (*path, "absorbs"), f"true, but {where}: {reads}, and {wider}, or no absorbs"
+        yield (*path, key), f"{value}, but {where}: {reads}, and {wider}, or no {key}"
     else:
         yield (*path, "side"), f"{where}: the water of a sea would reach it at once, and {wider}"
 

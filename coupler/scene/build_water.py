@@ -223,12 +223,13 @@ def _flows(case: Case, mesh, solids):
     sides = []
     for spec in case.water.inflow:
         flow = flow_of(case, spec)
-        flow = _absorbing(case, spec, flow, mesh, solids) if spec.absorbs else flow
+        if follows_inside(spec):
+            flow = _following(case, spec, flow, mesh, solids)
         sides.append(Side.of(mesh, sides_named([spec.side], mesh), flow))
     for sea in case.water.sea:
         if sea.absorbs:
             tide = waves.tide(-_outward(sea.side), sea_level(sea))
-            flow = _absorbing(case, sea, tide, mesh, solids)
+            flow = _following(case, sea, tide, mesh, solids)
             sides.append(Side.of(mesh, sides_named([sea.side], mesh), flow))
             continue
         sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=sea_level(sea)))
@@ -248,12 +249,22 @@ def sea_level(sea):
     )
 
 
-def _absorbing(case: Case, spec, flow, mesh, solids=()):
-    """The flow of an absorbing side; the outgoing wave is read one cell inside, at columns of the mesh, over what
-    solids leave of the depth.
+def follows_inside(spec) -> bool:
+    """Whether the side of an inflow or a sea follows the water a cell inside: it absorbs, or keeps its discharge."""
+    return spec.absorbs or keeps_discharge(spec)
+
+
+def keeps_discharge(spec) -> bool:
+    """Whether an inflow or a sea is an inflow that keeps its discharge."""
+    return getattr(spec, "keeps", "level") == "discharge"
+
+
+def _following(case: Case, spec, flow, mesh, solids=()):
+    """The flow of a side that absorbs or keeps its discharge; the water is read one cell inside, at columns of the
+    mesh, over what solids leave of the depth.
 
     Raises AbsorbingSideBlocked."""
-    from fluid.sides.absorbing import Absorber
+    from fluid.sides.absorbing import Absorber, kept_discharge, outgoing_wave
 
     axis = "xyz".index(spec.side[0])
     along = bed_along(case.tank, spec.side)
@@ -271,11 +282,12 @@ def _absorbing(case: Case, spec, flow, mesh, solids=()):
     there = np.isfinite(bed)
     if not there.any():
         raise AbsorbingSideBlocked(
-            f"side {spec.side} absorbs, but {cell:.3g} m inside of it, where the water is read, the tank has "
+            f"side {spec.side} {'keeps its discharge' if keeps_discharge(spec) else 'absorbs'}, but {cell:.3g} m inside of it, where the water is read, the tank has "
             f"no room for water: the ground reaches its upper side; let another side absorb, or move this one"
         )
     places, bed = places[there], raised_by(bed[there], places[there], solids)
-    return Absorber(flow, -_outward(spec.side), places, bed, case.case.gravity).as_flow()
+    law = kept_discharge if keeps_discharge(spec) else outgoing_wave
+    return Absorber(flow, -_outward(spec.side), places, bed, case.case.gravity, law).as_flow()
 
 
 def instants_of(case: Case, spec) -> np.ndarray:

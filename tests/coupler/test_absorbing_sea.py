@@ -10,7 +10,7 @@ from coupler.geometry.solid_ground import raised_by
 from coupler.geometry.tank_mesh import bed_along, bed_under, mesh_of
 from coupler.run.clock import Clock
 from coupler.scene.build import build
-from coupler.scene.build_water import AbsorbingSideBlocked, _absorbing
+from coupler.scene.build_water import AbsorbingSideBlocked, _following
 from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.readings.gauges import levels
@@ -134,7 +134,7 @@ def test_absorbing_side_before_ground_up_to_the_lid_is_refused(tmp_path):
     with pytest.raises(
         AbsorbingSideBlocked, match=r"side x- absorbs, but 20 m inside.*reaches its upper side"
     ):
-        _absorbing(case, case.water.sea[0], None, beyond)
+        _following(case, case.water.sea[0], None, beyond)
 
 
 HALF_FULL = """

@@ -514,6 +514,10 @@ def test_a_law_that_does_not_exist_or_has_no_potential_is_refused():
             {"gauge": [{"kind": "pressure", "name": "g", "at": [1, 1, 1], "impulse": [2, 3]}]},
             "gauge 'g' begins to add up at 2 s",
         ),
+        (
+            {"gauge": [{"kind": "flux", "name": "g", "at": [7, 0, 0], "edges": [[0, 10, 0], [0, 0, 5]]}]},
+            "75 % of the patch of gauge 'g' lies outside the tank, where nothing flows; its key at is the centre",
+        ),
     ],
 )
 def test_values_that_look_like_a_wrong_unit_are_reported(sections, says):

@@ -462,6 +462,21 @@ def test_a_sea_whose_tide_cannot_be_read_beside_a_full_tank_is_refused_for_its_t
     assert [path for path, _ in found] == [("water", "sea", 0, "tide", "path")]
 
 
+@pytest.mark.parametrize(
+    "inflow, said",
+    [
+        ({"absorbs": True}, "absorbs = true takes a part of the discharge back"),
+        ({"velocity": 0.0}, "velocity is 0 m/s: take a positive velocity"),
+        ({"velocity": -0.5}, "velocity is -0.5 m/s"),
+    ],
+)
+def test_an_inflow_that_keeps_its_discharge_brings_all_of_it(inflow, said):
+    spec = {"kind": "steady", "side": "x-", "level": 0.4, "velocity": 0.2, "keeps": "discharge", **inflow}
+    found = problems(case({"inflow": [spec]}, tank=TANK | {"open": ["x+"]}))
+    assert [path for path, _ in found] == [("water", "inflow", 0, "keeps")]
+    assert said in found[0][1]
+
+
 def test_a_steady_stream_into_a_sea_that_absorbs_is_told_to_raise_its_level():
     """Water 0.4 m deep at 0.2 m/s: a run stands at 0.4366 to 0.4376 m, by the invariants of long waves 0.4378 m."""
 
@@ -477,6 +492,9 @@ def test_a_steady_stream_into_a_sea_that_absorbs_is_told_to_raise_its_level():
     assert (
         "water.sea[0].absorbs = true: the level there rises by about 0.038 m above that of the sea" in found
     )
+    assert 'keeps = "discharge"' in found
+    (follows,) = told({"absorbs": True}, keeps="discharge")
+    assert "rises by about 0.038 m" in follows and "keeps =" not in follows
     assert told({"absorbs": False}) == told({"absorbs": True}, velocity=0.02) == []
     assert told({"absorbs": True}, velocity=-0.2) == told({"absorbs": True}, absorbs=True) == []
     assert told({"side": "y+", "absorbs": True}) == []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fluid.sides.absorbing import Absorber
+from fluid.sides.absorbing import Absorber, kept_discharge
 from fluid.sides.waves import n_wave, steady
 
 G, DEPTH = 9.81, 2.0
@@ -75,3 +75,43 @@ def test_n_wave_has_trough_and_crest_of_its_height_and_no_volume(sign):
     u = np.array([flow.velocity(np.zeros((1, 3)), t)[0, 0] for t in time])
     brought = np.trapezoid(u * (DEPTH + level), time)
     assert abs(brought) < 1e-6 * np.trapezoid(np.abs(u) * DEPTH, time)
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.5, 3.0])
+def test_a_stream_that_goes_on_behind_its_side_keeps_its_level(speed):
+    assert kept_discharge(DEPTH, speed, DEPTH, speed, G) == pytest.approx((DEPTH, speed), rel=1e-12)
+
+
+@pytest.mark.parametrize("inside, u_inside", [(1.3 * DEPTH, 0.2), (0.9 * DEPTH, 0.6), (1.1 * DEPTH, -0.3)])
+def test_water_behind_sets_the_depth_and_all_of_the_discharge_enters(inside, u_inside):
+    """The wave that comes out of the tank passes the side: -u + 2 sqrt(g h) is the same on both sides of it."""
+    h, u = kept_discharge(DEPTH, 0.5, inside, u_inside, G)
+    assert h * u == pytest.approx(0.5 * DEPTH, rel=1e-12)
+    assert u < np.sqrt(G * h)
+    assert 2.0 * np.sqrt(G * h) - u == pytest.approx(2.0 * np.sqrt(G * inside) - u_inside, rel=1e-12)
+
+
+def test_water_that_falls_away_takes_the_discharge_at_the_critical_depth():
+    h, u = kept_discharge(DEPTH, 0.5, 0.0, 0.0, G)
+    assert h * u == pytest.approx(0.5 * DEPTH)
+    assert u == pytest.approx(np.sqrt(G * h))
+
+
+def test_a_fast_stream_brings_its_depth_until_a_jump_reaches_its_side():
+    """0.5 m at 5 m/s has a jump to 1.366 m (momentum of both sides is equal there)."""
+    h, u = 0.5, 5.0
+    jump = 0.5 * h * (np.sqrt(1.0 + 8.0 * u**2 / (G * h)) - 1.0)
+    assert 0.5 * G * h**2 + h * u**2 == pytest.approx(0.5 * G * jump**2 + (h * u) ** 2 / jump)
+    for inside, u_inside in ((0.0, 0.0), (h, u), (0.99 * jump, 2.0)):
+        assert kept_discharge(h, u, inside, u_inside, G) == (h, u)
+    inside = 1.2 * jump
+    drowned, slow = kept_discharge(h, u, inside, h * u / inside, G)
+    assert (drowned, slow) == pytest.approx((inside, h * u / inside), rel=1e-12)
+
+
+def test_side_that_keeps_its_discharge_moves_level_and_speed_together():
+    side = Absorber(steady(INWARD, DEPTH, 0.5), INWARD, PLACES, np.zeros(2), G, kept_discharge)
+    side.update(np.full(2, 1.2 * DEPTH), np.tile(0.4 * INWARD, (2, 1)), 0.0)
+    flow = side.as_flow()
+    assert side.height > 0.1 * DEPTH
+    assert flow.level(0.0) * flow.velocity(np.zeros((1, 3)), 0.0)[0, 0] == pytest.approx(0.5 * DEPTH)
