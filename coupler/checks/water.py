@@ -220,8 +220,8 @@ def _streams_into_absorbing_seas(case: Case) -> Iterator[str]:
                 beside = (
                     ""
                     if keeps_discharge(spec)
-                    else f", and the water stands above its level at {spec.side}, which keeps it and so gives the water "
-                    'energy; let the inflow follow the water with keeps = "discharge"'
+                    else f", and the water stands above its level at {spec.side}, which keeps it and so gives the "
+                    'water energy; let the inflow follow the water with keeps = "discharge"'
                 )
                 yield (
                     f"the steady stream from {spec.side} leaves by the sea at {sea.side} as an outgoing wave into "
@@ -343,8 +343,8 @@ def _discharge(path: KeyPath, spec) -> Iterator[Problem]:
 
 
 def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
-    """A side that absorbs or keeps its discharge reads the water a cell inside, and a sea pushes water into dry cells beside it: the side
-    opposite to them must not be the next but one."""
+    """A side that absorbs or keeps its discharge reads the water a cell inside, and a sea pushes water into dry cells
+    beside it: the side opposite to them must not be the next but one."""
     axis = "xyz".index(spec.side[0])
     cells = _cells_across(tank, axis)
     if cells >= LEAST_ACROSS:

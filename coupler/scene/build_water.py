@@ -281,8 +281,9 @@ def _following(case: Case, spec, flow, mesh, solids=()):
     bed = bed_under(mesh, places)  # there, not at the side: a bed that rises inwards is higher
     there = np.isfinite(bed)
     if not there.any():
+        does = "keeps its discharge" if keeps_discharge(spec) else "absorbs"
         raise AbsorbingSideBlocked(
-            f"side {spec.side} {'keeps its discharge' if keeps_discharge(spec) else 'absorbs'}, but {cell:.3g} m inside of it, where the water is read, the tank has "
+            f"side {spec.side} {does}, but {cell:.3g} m inside of it, where the water is read, the tank has "
             f"no room for water: the ground reaches its upper side; let another side absorb, or move this one"
         )
     places, bed = places[there], raised_by(bed[there], places[there], solids)

@@ -1,7 +1,7 @@
 """Sides that follow the water a cell inside: absorbing ones, and inflows that keep their discharge.
 
-Absorbing: the given flow enters, and waves that run against it leave.  Long waves over level ground, by their Riemann invariants (Stoker, Water Waves, 1957, 10.2): with h the depth and u the
-velocity inwards, means over the side,
+Absorbing: the given flow enters, and waves that run against it leave.  Long waves over level ground, by their
+Riemann invariants (Stoker, Water Waves, 1957, 10.2): with h the depth and u the velocity inwards, means over the side,
 
     R_in  = u + 2 sqrt(g h)   of the given flow              goes in
     R_out = -u + 2 sqrt(g h)  of the water a cell inside     goes out
@@ -73,8 +73,8 @@ class Absorber:
     """flow: the given flow · inward (3,) unit · places (k, 2) [m] a cell inside the side · bed (k,) [m] there · gravity
     · law: `outgoing_wave` or `kept_discharge`
 
-    height, speed: corrections by the law to the level [m] and to the velocity inwards [m/s] of the given flow, kept until
-    the next `update`."""
+    height, speed: corrections by the law to the level [m] and to the velocity inwards [m/s] of the given flow, kept
+    until the next `update`."""
 
     flow: Flow
     inward: Array

@@ -82,7 +82,9 @@ def test_a_stream_that_goes_on_behind_its_side_keeps_its_level(speed):
     assert kept_discharge(DEPTH, speed, DEPTH, speed, G) == pytest.approx((DEPTH, speed), rel=1e-12)
 
 
-@pytest.mark.parametrize("inside, u_inside", [(1.3 * DEPTH, 0.2), (0.9 * DEPTH, 0.6), (1.1 * DEPTH, -0.3)])
+@pytest.mark.parametrize(
+    ("inside", "u_inside"), [(1.3 * DEPTH, 0.2), (0.9 * DEPTH, 0.6), (1.1 * DEPTH, -0.3)]
+)
 def test_water_behind_sets_the_depth_and_all_of_the_discharge_enters(inside, u_inside):
     """The wave that comes out of the tank passes the side: -u + 2 sqrt(g h) is the same on both sides of it."""
     h, u = kept_discharge(DEPTH, 0.5, inside, u_inside, G)
