@@ -65,7 +65,11 @@ WATER = (
         "1",
         "volume + left - entered - volume at the start, over the volume at the start and what entered",
     ),
-    ("reinserted", "m3", "volume that the uniform correction moved so far, a sum of absolute values"),
+    (
+        "reinserted",
+        "m3",
+        "volume that the last correction of the total moved so far, a sum of absolute values",
+    ),
     ("reinserted_net", "m3", "the same with its sign: positive where the transport had lost water"),
     ("clipped", "1", "nodes whose speed was capped so far (spray)"),
     (

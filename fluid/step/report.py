@@ -12,7 +12,7 @@ from fluid.step.momentum import MomentumChange
 class StepReport:
     """What the last step did.
 
-    volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the uniform
+    volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the last
     shift (signed) · clipped: nodes at the speed limit · unknowns of the pressure · work_on_bodies [J] ·
     energy_change [J]: change of kinetic + potential energy by stage (transport and gravity, volume correction,
     pressure, damping and limit) · momentum: what changed it · left [m³], left_energy [J]: through open sides ·

@@ -19,7 +19,7 @@ class Losses:
     def __init__(self, water):
         self.water = water
         self.moved = 0.0
-        """Σ |volume moved by the uniform shift| [m³]: lost with its surface in one place, back in another."""
+        """Σ |volume moved by the last shift| [m³]: lost with its surface in one place, back in another."""
         self.clipped = 0
         """Node-steps at the speed limit."""
         self.history: list[tuple[float, float, int]] = []
