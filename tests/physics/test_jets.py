@@ -107,8 +107,9 @@ def test_without_the_bound_the_edges_of_a_plate_are_pulled_at():
 
 
 def test_an_inclined_plate_takes_the_part_of_the_momentum_across_it():
-    """Along the plate the sheets push nowhere: with water of its own behind slivers it took 7 % too much."""
-    force = jet(12.0, 4, angle=60.0).force
+    """Along the plate the sheets push nowhere: with water of its own behind slivers it took 7 % too much. The mean of
+    four places of plate and jet within the cells is 4.5 % too large."""
+    force = np.mean([jet(12.0, 4, angle=60.0, aside=aside).force for aside in (0.0, 0.25, 0.5, 0.75)])
     assert force == pytest.approx(np.sin(np.radians(60.0)), rel=0.05)
 
 
