@@ -153,6 +153,11 @@ class Topology:
         return self.spacing / self.node_size
 
     @cached_property
+    def room(self) -> Array:
+        """(N,) [m³] `node_volume` times the cube of `finer`: what a node could hold if its cells had the mean size."""
+        return self.node_volume if self.is_uniform else self.node_volume * self.finer**3
+
+    @cached_property
     def is_uniform(self) -> bool:
         """Whether all cells have the same size."""
         return bool((self.node_size == self.spacing).all())

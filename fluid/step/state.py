@@ -118,6 +118,7 @@ def restore(water, domain, arrays) -> None:
         velocity=of_flux.field(len(water.topology.cells)),
         water=water.nodal_water - water.displaced,
         capacity=water.topology.node_volume,
+        room=water.topology.room,
     )
     if water.sides is not None:
         for name in SIDES:

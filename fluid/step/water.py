@@ -503,7 +503,7 @@ class Water:
     def set_domain(self, domain) -> None:
         self.domain = domain
         self.topology = t = Topology.of(self.mesh, domain)
-        self._roomy = t.node_volume * t.finer**3 > LEAST_COUNTED * self.mesh.spacing**3
+        self._roomy = t.room > LEAST_COUNTED * self.mesh.spacing**3
         """(N,) bool: nodes that set the step where they are wet."""
         self.nodes_below_floor = self.below_floor(t.nodes)
         """g·x (N,) [m²/s²] of the nodes."""

@@ -67,7 +67,7 @@ relative tolerance."""
 class Flux:
     """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`;
     velocity (M, 3) [m/s] of the cells that it comes from; water (N,) and capacity (N,) [m³]: what every node holds and
-    could hold on the same domain."""
+    could hold on the same domain; room (N,) [m³]: `Topology.room` of it."""
 
     nodes: Ints
     graph: Graph
@@ -75,6 +75,7 @@ class Flux:
     velocity: Floats
     water: Floats
     capacity: Floats
+    room: Floats
 
 
 @released
@@ -120,7 +121,13 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     water (N,) [m³] volume at the nodes."""
     rate = edge_rates(topology, graph, listed, u_cell)
     return Flux(
-        nodes=listed, graph=graph, rate=rate, velocity=u_cell, water=water, capacity=topology.node_volume
+        nodes=listed,
+        graph=graph,
+        rate=rate,
+        velocity=u_cell,
+        water=water,
+        capacity=topology.node_volume,
+        room=topology.room,
     )
 
 

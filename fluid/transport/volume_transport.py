@@ -24,7 +24,8 @@ from kernels.threads import over, owning, reach_of_rows, zeros
 
 LARGEST_COURANT = 0.8
 LEAST_COUNTED = 0.3
-"""Courant number of a substep, and nodes that set it: those of at least this share of the median volume."""
+"""Courant number of a substep, and nodes that set it: those of at least this share of the median volume, both in cells
+of their own size."""
 
 
 def carry_volume(flux: Flux, dt: float, u=None):
@@ -34,10 +35,12 @@ def carry_volume(flux: Flux, dt: float, u=None):
     u (N, 3) [m/s], if given, is carried with the volume, in place (`velocity_transport.py`); nodes without water keep
     theirs."""
     water, total, capacity = copied(flux.water), None, flux.capacity
-    least = LEAST_COUNTED * median_of(capacity, flux.nodes) if len(flux.nodes) else 0.0
+    least = LEAST_COUNTED * median_of(flux.room, flux.nodes) if len(flux.nodes) else 0.0
     g = flux.graph
     count = len(flux.nodes)
-    turnover = max(over(_largest_turnover, count, flux.nodes, g.row, g.start, flux.rate, capacity, least))
+    turnover = max(
+        over(_largest_turnover, count, flux.nodes, g.row, g.start, flux.rate, capacity, flux.room, least)
+    )
     n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
     edges, reach = g.edges, reach_of_rows(flux.nodes, g.row, g.start, g.neighbour)
     share, change = zeros((len(water),)), zeros((len(water),))
@@ -76,12 +79,12 @@ def _add(first, last, nodes, graph_row, start, moved, total):
 
 
 @released
-def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, least):
-    """max_i Σ out / V_i [1/s] over nodes of some size."""
+def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, room, least):
+    """max_i Σ out / V_i [1/s] over nodes of some size, whose room (N,) [m³] is more than `least` [m³]."""
     largest = 0.0
     for place in range(first, last):
         i = nodes[place]
-        if capacity[i] > least:
+        if room[i] > least:
             largest = max(largest, _out(np.uint64(graph_row[i]), start, rate) / max(capacity[i], 1e-300))
     return largest
 
