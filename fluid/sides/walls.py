@@ -30,8 +30,8 @@ class Walls:
     sticking (k,) rows of those where u = 0, slipping (k, 3, 3) onto the directions they leave free where they are dry ·
     open_node (N,) bool, p = 0; open_nodes (k,) their numbers, open_projector (k, 3, 3) onto their normals ·
     open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors of the parts that solids leave open, open_cell
-    (F,) behind them · rough_faces (C, 3), rough_area (C, 3) [m²] of the whole faces, rough_cell (C,): the same for
-    closed sides with no slip or friction. Cells are those of the background mesh, or of a domain (`on_domain`)."""
+    (F,) behind them · rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,): the same for closed sides with no
+    slip or friction. Cells are those of the background mesh, or of a domain (`on_domain`)."""
 
     nodes: Ints
     projector: Floats
@@ -115,7 +115,7 @@ class Walls:
             open_area=opened.share[:, None] * self.open_area[opened.row],
             open_cell=opened.cell,
             rough_faces=rough.nodes,
-            rough_area=self.rough_area[rough.row],
+            rough_area=rough.share[:, None] * self.rough_area[rough.row],
             rough_cell=rough.cell,
             flowing=_copies(self.flowing, parent_node)[0],
         )

@@ -99,7 +99,7 @@ class WallFriction:
         t, w = water.topology, water.walls
         faces, area, cell = w.rough_faces, w.rough_area, w.rough_cell
         size = np.linalg.norm(area, axis=1)
-        unit = area / size[:, None]
+        unit = area / np.maximum(size, 1e-300)[:, None]
         if columns is not None:
             floor = unit[:, 2] < -LOOKS_UP
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
@@ -107,7 +107,6 @@ class WallFriction:
             depth, left = columns.depth[at], columns.left[at]
             mean = np.linalg.norm(_along(columns.velocity[at], unit), axis=1)
         centre = t.nodes[faces].mean(axis=1)
-        size = size * t.fraction[cell]  # water does not slide over the part of a face that solids cover
         drag = np.zeros(len(phi))
         for corner in range(3):
             node = faces[:, corner]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fluid.cut.bodies import ConvexBodies
+from fluid.viscous.wall_friction import OFF_WALL, log_law
 from tests.fluid.scenes import tank
 
 SIZE, THICK = (1.6, 0.8, 0.4), 0.02
@@ -43,3 +44,18 @@ def test_the_floor_rubs_on_both_sides_of_a_thin_wall():
     side[water.topology.cells[y > 0.4]] = 1.0
     on_floor = (water.topology.nodes[:, 2] < 1e-9) & (water.topology.nodes[:, 0] > 0.85)
     assert drag[on_floor & (side > 0)].sum() == pytest.approx(drag[on_floor & (side == 0)].sum(), rel=1e-9)
+
+
+@pytest.mark.parametrize("bottom", [0.03, 0.0])
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_a_floor_rubs_but_for_what_stands_on_it(bottom, covers):
+    """Drag over a full tank: all of its sides under a plate just above the floor, which had lost a third there, and the
+    rest of them around one on it."""
+    plate = ConvexBodies.boxes([[0.8, 0.4, bottom + 0.02]], [[0.53, 0.31, 0.04]])
+    rough = {"walls": "friction", "roughness": 3e-3}
+    water = tank(SIZE, 0.1, lambda x: x[:, 2] - 9.0, plate, covers=covers, **rough)
+    u = np.zeros_like(water.velocity)
+    u[:, 0] = 1.0
+    drag = water.viscous.friction.of_nodes(water, water.level_set, None, u)
+    area = 2.0 * SIZE[0] * (SIZE[1] + SIZE[2]) - (0.0 if bottom else 0.53 * 0.31)
+    assert drag.sum() == pytest.approx(1000.0 * log_law(OFF_WALL * 0.1, 3e-3) * area, rel=1e-9)
