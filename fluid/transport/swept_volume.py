@@ -57,7 +57,7 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
         _in_reach, len(around), around, phi, t.node_size, t.cells, flux.velocity, velocity, beside
     )
     after, near = copied(phi), np.flatnonzero(beside)
-    state = ((counted, velocity), phi, u, dt, t.paths, t.volume)
+    state = ((counted, flux.velocity, velocity), phi, u, dt, t.paths, t.volume)
     over(_after, len(near), near, *state, after, weight=WORK)
     beside[:] = False
     over(_by_share, len(reached), reached, phi, after, t.parts, flux.velocity, velocity, beside)
@@ -106,24 +106,25 @@ def _in_reach(first, last, cell_list, phi, size, cells, u, velocity, beside):
 
 
 @ranged
-def _after(first, last, nodes, cleared, phi, u, dt, mesh, volume, out):
+def _after(first, last, nodes, beyond, phi, u, dt, mesh, volume, out):
     """φ (N,) [m] that u has carried on for dt at the listed nodes, with the mean of ∇φ over the cells around each.
 
-    cleared: nodes (N,) bool, and a velocity (M, 3) that becomes zero in the cells around listed nodes that have none
-    of these among their corners."""
+    beyond: nodes (N,) bool, and velocities (M, 3) of which the second becomes the first in wet cells around listed
+    nodes that have none of these among their corners, and zero in other such cells."""
     cells, parent, g = mesh.cells, mesh.parent, mesh.gradients
-    counted, velocity = cleared
+    counted, whole, velocity = beyond
     for s in range(first, last):
         i, weight, rate = np.uint64(nodes[s]), 0.0, 0.0
         if not counted[i]:
             for c in range(mesh.node_start[i], mesh.node_start[i + np.uint64(1)]):
                 e = mesh.node_cells[c]
-                n_counted = 0
+                n_counted, n_wet = 0, 0
                 for a in range(4):
                     n_counted += counted[cells[e, a]]
+                    n_wet += phi[cells[e, a]] < 0.0
                 if n_counted == 0:
                     for k in range(3):
-                        velocity[e, k] = 0.0
+                        velocity[e, k] = whole[e, k] if n_wet == 4 else 0.0
         for c in range(mesh.node_start[i], mesh.node_start[i + np.uint64(1)]):
             e = mesh.node_cells[c]
             p = parent[e]

@@ -17,11 +17,11 @@ CELL, DT = 0.25, 0.01
 UPWARDS = np.array([0.0, 0.0, 1.0])
 
 
-def rising(normal, speed, place, size=(0.75, 0.5, 2.0), bodies=None):
+def rising(normal, speed, place, size=(0.75, 0.5, 2.0), bodies=None, cell=CELL):
     """Water below the plane through (0, 0, place) that moves at a speed [m/s] along its normal: the Water, what its
     nodes hold after DT, by the fluxes along the edges, by what the surface sweeps, and exactly."""
     normal = np.asarray(normal, float) / np.linalg.norm(normal)
-    mesh = box_mesh(np.zeros(3), size, CELL)
+    mesh = box_mesh(np.zeros(3), size, cell)
     domain = cut_domain(mesh, ConvexBodies.empty() if bodies is None else bodies, "single")
     at = (domain.nodes - place * UPWARDS) @ normal
     water = Water(mesh, domain, at, WaterParameters(), velocity=speed * normal * np.ones((len(at), 1)))
@@ -50,6 +50,18 @@ def test_a_level_surface_that_rises_brings_every_node_what_a_plane_does(place, s
     came = DT * abs(speed) * CELL**2
     assert np.abs(found - exact)[near].max() < 2e-3 * came
     assert np.abs(along - exact)[near].max() > 0.03 * came
+
+
+@pytest.mark.parametrize("height", [6.0, 8.0])
+def test_it_is_exact_on_slender_cells(height):
+    """Where corners of a cell at the surface are farther from it than three cell sizes, what comes from below counts as
+    it does elsewhere: all of it was taken back."""
+    cell = CELL * np.array([1.0, 1.0, height])
+    size = (0.75, 0.5, 6.0 * cell[2])
+    water, _, found, exact = rising(UPWARDS, 0.5, 3.95 * cell[2], size, cell=cell)
+    inner = np.abs(water.topology.nodes[:, 2] - 3.0 * cell[2]) < 1.5 * cell[2]
+    came = DT * 0.5 * CELL**2
+    assert np.abs(found - exact)[inner].max() < 1e-9 * came
 
 
 def test_what_is_swept_is_kept():
