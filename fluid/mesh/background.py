@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from skfem import MeshTet
 
 from array_types import Array, Floats, Integers, Ints
@@ -215,6 +216,19 @@ class Background:
         return Shapes.of(self)
 
     @cached_property
+    def plan(self) -> sp.csr_array:
+        """(M, nx ny) share of each cell in each column of bins, number i ny + j: that of the rectangle around the cell
+        in the plan. A cell that straddles no columns is in one of them."""
+        x, y, _ = self.axes
+        corners = (self.nodes[self.cells[some], :2] for some in spans(len(self.cells)))
+        count, column, share = zip(
+            *(_shares((x, y), *_shrunk(c.min(axis=1), c.max(axis=1))) for c in corners)
+        )
+        start = np.concatenate([[0], np.cumsum(np.concatenate(count))])
+        shape = (len(self.cells), (len(x) - 1) * (len(y) - 1))
+        return sp.csr_array((np.concatenate(share), np.concatenate(column), start), shape=shape)
+
+    @cached_property
     def skfem(self) -> MeshTet:
         """The same mesh for scikit-fem (node and cell numbers unchanged)."""
         cells = self.cells.T.astype(np.int64)
@@ -310,6 +324,22 @@ def _shrunk(low, high):
 def bin_of(axis, x) -> Array:
     """Number of the bin along one of the axes that holds each coordinate x (m,) [m]; beyond the ends, the nearest."""
     return np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
+
+
+def _shares(axes, low, high):
+    """Columns of bins that the rectangles from low to high (n, 2) reach: count (n,), number (k,) of each column, and
+    share (k,) of its rectangle that lies in it."""
+    first, last = (np.column_stack([bin_of(axes[k], x[:, k]) for k in range(2)]) for x in (low, high))
+    across = last - first + 1
+    count = across.prod(axis=1)
+    of = np.repeat(np.arange(len(low)), count)
+    rank = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    at = (first[of, 0] + rank // across[of, 1], first[of, 1] + rank % across[of, 1])
+    area = np.ones(len(of))
+    for k, axis in enumerate(axes):
+        area *= np.minimum(high[of, k], axis[at[k] + 1]) - np.maximum(low[of, k], axis[at[k]])
+    column = at[0] * (len(axes[1]) - 1) + at[1]
+    return count, column.astype(np.int32), area / np.bincount(of, area, minlength=len(low))[of]
 
 
 def _fill_bins(low, high, nx, ny, nz):

@@ -87,11 +87,11 @@ class WallFriction:
         if columns is None:
             centre = walls.centre()
             return self.density * log_law(OFF_WALL * t.size[walls.cell], _at(self.roughness, centre)) * slip
-        at = columns.over(walls.cell)
-        mean = np.linalg.norm(_along(columns.velocity[at] - body, walls.normal), axis=1)
+        depth, velocity, left = columns.over(walls.cell)
+        mean = np.linalg.norm(_along(velocity - body, walls.normal), axis=1)
         bed = walls.normal[:, 2] > LOOKS_UP
         least = water.mesh.local_size[t.background[walls.cell]]
-        factor = self._bed(columns.depth[at], least, walls.centre(), mean, columns.left[at] * slip)
+        factor = self._bed(depth, least, walls.centre(), mean, left * slip)
         return np.where(bed, self.density * factor, 0.0)
 
     def of_nodes(self, water, phi, columns, u):
@@ -103,9 +103,8 @@ class WallFriction:
         if columns is not None:
             floor = unit[:, 2] < -LOOKS_UP
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
-            at = columns.over(cell)
-            depth, left = columns.depth[at], columns.left[at]
-            mean = np.linalg.norm(_along(columns.velocity[at], unit), axis=1)
+            depth, velocity, left = columns.over(cell)
+            mean = np.linalg.norm(_along(velocity, unit), axis=1)
         centre = t.nodes[faces].mean(axis=1)
         drag = np.zeros(len(phi))
         for corner in range(3):
@@ -121,10 +120,10 @@ class WallFriction:
 
     def mixing(self, water, columns, cells):
         """ν_t (n,) [m²/s] of equation (3) in cells (n,) of the domain."""
-        t, at = water.topology, columns.over(cells)
-        depth = np.maximum(columns.depth[at], water.mesh.local_size[t.background[cells]])
+        t, (depth, velocity, _) = water.topology, columns.over(cells)
+        depth = np.maximum(depth, water.mesh.local_size[t.background[cells]])
         friction = self._factor(depth, t.nodes[t.cells[cells]].mean(axis=1))
-        speed = np.linalg.norm(columns.velocity[at, :2], axis=1)
+        speed = np.linalg.norm(velocity[:, :2], axis=1)
         return np.sqrt(friction) * speed * depth * np.maximum(KARMAN / 6.0, 2.0 / 3.0 * np.sqrt(friction))
 
     def _bed(self, depth, least, place, mean, there):
@@ -169,27 +168,23 @@ class Columns:
         t, (x, y, _) = water.topology, water.mesh.axes
         wet = t.cells_around(phi < 0.0)
         area = np.outer(np.diff(x), np.diff(y)).ravel()
-        own, held = _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.parts)
-        flow = held[:, None] * u[t.cells[wet]].mean(axis=1)
-        volume = np.bincount(own, held, minlength=len(area))
-        total = np.column_stack([np.bincount(own, flow[:, k], minlength=len(area)) for k in range(3)])
+        there, held = _columns(water, wet).T, t.volume[wet] * wet_fraction(wet, phi, t.parts)
+        volume, total = there @ held, there @ (held[:, None] * u[t.cells[wet]].mean(axis=1))
         middle = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
         centre = np.column_stack([a.ravel() for a in middle])
         mean = total / np.maximum(volume, 1e-300)[:, None]
         return cls(volume / area, mean, np.ones(len(area)), centre, water)
 
     def over(self, cells):
-        """Number of the column (n,) of cells (n,) of the domain."""
-        return _column(self.of_water, cells)
+        """Depth (n,) [m], velocity (n, 3) [m/s] and share left (n,) of the columns that cells (n,) of the domain stand
+        in, means by `Background.plan`."""
+        there = _columns(self.of_water, cells)
+        return there @ self.depth, there @ self.velocity, there @ self.left
 
 
-def _column(water, cells):
-    """Number of the column of bins that holds the centre of each cell (n,)."""
-    x, y, _ = water.mesh.axes
-    centre = water.topology.nodes[water.topology.cells[cells]].mean(axis=1)
-    i = np.clip(np.searchsorted(x, centre[:, 0]) - 1, 0, len(x) - 2)
-    j = np.clip(np.searchsorted(y, centre[:, 1]) - 1, 0, len(y) - 2)
-    return i * (len(y) - 1) + j
+def _columns(water, cells):
+    """`Background.plan` of cells (n,) of the domain."""
+    return water.mesh.plan[water.topology.background[cells]]
 
 
 def _rigid_velocity(water, walls):

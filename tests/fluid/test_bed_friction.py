@@ -7,6 +7,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
+from fluid.mesh.refinement import InBox, refined_mesh
 from fluid.sides.inflow import Side, Sides
 from fluid.sides.waves import steady
 from fluid.step.parameters import WaterParameters
@@ -58,6 +59,26 @@ def test_the_bed_takes_what_a_step_of_any_length_leaves_of_the_stream(step):
     left = columns.velocity[:, 0]
     np.testing.assert_allclose(left + step * drag * left**2, 2.0, rtol=1e-9)
     np.testing.assert_allclose(columns.left, 0.5 * left, rtol=1e-9)
+
+
+@pytest.mark.parametrize("levels", [0, 2])
+def test_the_depth_is_that_of_the_water_on_cells_of_several_sizes(levels):
+    """A pool of 1 m at 2 m/s on cells most of which are finer, which make the columns: coarse ones straddle several of
+    them, and where each counted in the one of its centre, depths were 0.67 to 1.33 m."""
+    mesh = box_mesh(np.zeros(3), [8.0, 8.0, 2.0], 0.5)
+    if levels:
+        mesh = refined_mesh(mesh, [InBox((1, 1, 0), (7, 7, 2), levels)])
+    settings = WaterParameters(walls="friction", manning=0.03)
+    water = Water(mesh, cut_domain(mesh, DRY), lambda x: x[:, 2] - 1.0, settings)
+    u = np.tile([2.0, 0.0, 0.0], (len(water.level_set), 1))
+    friction = WallFriction.of(settings)
+    columns = friction.columns(water, water.level_set, u, 0.0)
+    drag = friction.of_nodes(water, water.level_set, columns, u)
+    floor = (mesh.nodes[:, 2] == 0.0) & (np.abs(mesh.nodes[:, :2] - 4.0) < 4.0).all(axis=1)
+    stress = 1000.0 * settings.gravity * 0.03**2 * 2.0
+    np.testing.assert_allclose(drag[floor], stress * mesh.boundary_of_nodes[floor], rtol=1e-7)
+    mixing = friction.mixing(water, columns, np.flatnonzero((water.level_set[mesh.cells] < 0.0).any(axis=1)))
+    np.testing.assert_allclose(mixing, mixing.mean(), rtol=1e-7)
 
 
 def stream(start, until, manning, slope=0.1, cell=0.25, length=16.0):
