@@ -42,7 +42,7 @@ NO_GROUND = Ground(-1, np.zeros(2), np.zeros(2), np.zeros((2, 2)), False, 1.0)
 class GroundSurface(FixedPlane):
     """Uneven ground as a fixed body. x (nx,), y (ny,) increasing, z (nx, ny) [m]: corners of its triangles, counted
     from `point`, at or above it · mirrored: squares with i + j odd are split from (1, 0) to (0, 1), all others from
-    (0, 0) to (1, 1). Beyond its edges it is level."""
+    (0, 0) to (1, 1). Beyond its edges it is level, outwards at the height of the edge."""
 
     x: Array = None
     y: Array = None
@@ -106,6 +106,12 @@ def surface_at(ground, px, py, normal):
     else:
         along, across = z11 - z01, z01 - z00
         height = z00 + s * along + t * across
+    beyond_x = px < ground.x[i] or px > ground.x[i + 1]
+    beyond_y = py < ground.y[j] or py > ground.y[j + 1]
+    if beyond_x:  # the ground goes on level, so that nothing slides outwards or back
+        along, across = 0.0, z11 - z10 if s > 0.5 else z01 - z00
+    if beyond_y:
+        along, across = 0.0 if beyond_x else z11 - z01 if t > 0.5 else z10 - z00, 0.0
     normal[0], normal[1], normal[2] = -along / dx, -across / dy, 1.0
     size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + 1.0)
     for k in range(3):

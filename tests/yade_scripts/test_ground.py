@@ -1,0 +1,46 @@
+"""Uneven ground beyond its edges, where blocks come that leave a tank over an open side."""
+
+import numpy as np
+import pytest
+
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.ground import GroundSurface, surface_at
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
+
+SLOPE, ACROSS = 0.3, 0.2
+X, Y = np.linspace(0.0, 10.0, 11), np.linspace(0.0, 4.0, 5)
+UP = (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize(
+    ("place", "gradient"),
+    [
+        ((12.0, 2.3), (0.0, ACROSS)),
+        ((-1.0, 2.0), (0.0, ACROSS)),
+        ((3.6, 5.0), (SLOPE, 0.0)),
+        ((3.0, -2.0), (SLOPE, 0.0)),
+        ((12.0, 5.0), (0.0, 0.0)),
+        ((-1.0, -1.0), (0.0, 0.0)),
+    ],
+)
+def test_ground_goes_on_level_outwards(place, gradient, mirrored):
+    z = SLOPE * X[:, None] + ACROSS * Y
+    ground = GroundSurface((0.0, 0.0, 0.0), UP, x=X, y=Y, z=z, mirrored=mirrored).as_row(0)
+    normal = np.zeros(3)
+    height = surface_at(ground, *place, normal)
+    assert height == pytest.approx(SLOPE * np.clip(place[0], 0, 10) + ACROSS * np.clip(place[1], 0, 4))
+    np.testing.assert_allclose(-normal[:2] / normal[2], gradient, atol=1e-12)
+
+
+@pytest.mark.parametrize("slope", [SLOPE, -SLOPE])
+def test_block_beyond_the_edge_stays_where_it_is(slope):
+    """Without friction: with the normal of the last triangle it slid at slope g, and its energy grew."""
+    z = np.tile((slope * X - min(0.0, slope * X[-1]))[:, None], (1, len(Y)))
+    ground = GroundSurface((0.0, 0.0, 0.0), UP, "terrain", bonds=False, x=X, y=Y, z=z)
+    block = Block("b", np.array([12.0, 2.0, z[-1, 0] + 0.5]), size=np.ones(3))
+    with Structure([block], ContactLaw(stiffness=5e7, friction=0.0), planes=[ground]) as structure:
+        structure.advance(0.5)
+        np.testing.assert_allclose(structure.centre()[0, :2], block.centre[:2], atol=1e-12)
+        assert structure.energies()["kinetic"] < 1e-6
