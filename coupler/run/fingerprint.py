@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from coupler.case.paths import stamp
 from coupler.program import provenance
 
 FREE = ("time.end", "time.step_max", "time.cfl", "time.checkpoint_every", "coupling.", "limits.")
@@ -36,28 +38,51 @@ def scene_parts(coupling) -> dict[str, str]:
     return parts
 
 
-def file_digests(case: dict) -> dict[str, str]:
-    """Digest of each file that an effective case names, by its path; files of a study, which no run reads, left out."""
+def file_digests(case: dict, keys: tuple[str, ...] = FILE_KEYS) -> dict[str, str]:
+    """Digest of each file that an effective case names under `keys`, by its path; files of a study, which no run reads,
+    left out."""
     named = {section: value for section, value in case.items() if section != "study"}
-    return {name: _of_file(Path(name)) for name in sorted(set(_named(named))) if Path(name).is_file()}
+    names = sorted(set(_named(named, keys)))
+    return {name: _of_file(name, stamp(name)) for name in names if Path(name).is_file()}
 
 
-def _named(value: object) -> Iterator[str]:
-    """Strings under FILE_KEYS, anywhere in a table."""
+def run_inputs(case: dict) -> dict[str, dict[str, str]]:
+    """What a run of an effective case reads besides it: digests of the files that it names, that of its mesh included,
+    and checksums of joint laws from outside of the program; empty where there is neither."""
+    found = {
+        "files": file_digests(case, (*FILE_KEYS, "mesh")),
+        "laws": _outside_laws(case.get("joints") or {}),
+    }
+    return {kind: digests for kind, digests in found.items() if digests}
+
+
+def _outside_laws(joints: dict) -> dict[str, str]:
+    """Checksum of each law of the joints that did not come with the program."""
+    used = {table["law"] for table in (joints, *joints.get("pair", ())) if table.get("law")}
+    if not used:
+        return {}
+    from yade_scripts.joints import laws
+
+    return {name: laws.identity(name)["checksum"] for name in sorted(used - {*laws.shipped()})}
+
+
+def _named(value: object, keys: tuple[str, ...]) -> Iterator[str]:
+    """Strings under `keys`, anywhere in a table."""
     if isinstance(value, dict):
         for key, entry in value.items():
-            if key in FILE_KEYS and isinstance(entry, str):
+            if key in keys and isinstance(entry, str):
                 yield entry
             else:
-                yield from _named(entry)
+                yield from _named(entry, keys)
     elif isinstance(value, list):
         for entry in value:
-            yield from _named(entry)
+            yield from _named(entry, keys)
 
 
-def _of_file(path: Path) -> str:
+@lru_cache
+def _of_file(path: str, _stamp: tuple[int, int]) -> str:
     """Read piece by piece: a raster may be larger than the memory that a run has to spare."""
-    with path.open("rb") as file:
+    with Path(path).open("rb") as file:
         return hashlib.file_digest(file, _new_digest).hexdigest()
 
 

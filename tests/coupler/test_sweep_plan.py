@@ -6,6 +6,7 @@ import pytest
 from coupler.checks.read_case import load
 from coupler.commands.sweep.plan import make_plan
 from coupler.program.errors import BadCase
+from yade_scripts.joints import outside_laws
 
 from .arm import CASE
 
@@ -209,6 +210,66 @@ def test_a_longer_list_leaves_the_other_runs_as_they_are(case):
     assert len(short.rows) == 16
     assert set(short.runs) < set(long.runs)
     assert len(long.runs) == 24
+
+
+BOX = """\
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 {h}\nv 1 0 {h}\nv 1 1 {h}\nv 0 1 {h}
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8
+"""
+OF_FILE = """\
+[case]
+title = "a block from a file"
+[time]
+end = 1
+[structure]
+[[structure.file]]
+path = "box.obj"
+[contact]
+stiffness = 1e6
+[[sweep.vary]]
+key = "contact.friction"
+values = [0.3, 0.5]
+"""
+
+
+def test_another_content_of_a_file_makes_other_runs(case):
+    """Else a call after the file was changed would report the runs of the old one."""
+    first = make_plan(case(text=OF_FILE, files={"box.obj": BOX.format(h=1)}))
+    other = make_plan(case(text=OF_FILE, files={"box.obj": BOX.format(h=2.5)}))
+    again = make_plan(case(text=OF_FILE, files={"box.obj": BOX.format(h=1)}))
+    assert set(first.runs) == set(again.runs)
+    assert not set(first.runs) & set(other.runs)
+
+
+LAW = """\
+from numba import njit
+from surgebreak import CohesiveLaw
+@njit
+def secant(r, peak):
+    return 6.75 * (1.0 - r) ** 2
+@njit
+def work(r, peak):
+    return 6.75 * r * r * (0.5 - 2.0 * r / 3.0 + 0.25 * r * r)
+LAW = CohesiveLaw(secant, work, peak=1 / 3, lowest_peak=1 / 3, highest_peak=1 / 3, points={points})
+"""
+
+
+def test_another_law_of_the_same_name_makes_other_runs(case, tmp_path, monkeypatch):
+    for name in ("_registered", "_origins", "_files"):
+        monkeypatch.setattr(outside_laws, name, {})
+    monkeypatch.setenv(outside_laws.VARIABLE, "")
+    text = CASE.replace("[joints]", '[joints]\nlaw = "own"')
+    vary = '[[sweep.vary]]\nkey = "joints.strength"\nvalues = [1e6, 2e6]\n'
+    made = []
+    for points in (3, 5):
+        place = tmp_path / str(points) / "own.py"
+        place.parent.mkdir()
+        place.write_text(LAW.format(points=points), encoding="utf-8")
+        outside_laws.register_file(place)
+        made.append(set(make_plan(case(text=text, sweep=vary)).runs))
+        outside_laws._files.clear()
+    assert len(made[0]) == len(made[1]) == 2
+    assert not made[0] & made[1]
 
 
 def test_more_samples_of_sobol_points_leave_the_first_runs_as_they_are(case):

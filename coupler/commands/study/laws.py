@@ -19,6 +19,7 @@ from coupler.commands.study.runner import Runs
 from coupler.program.errors import SurgebreakError
 from coupler.program.process import trouble
 from coupler.run.directory import write_json
+from coupler.run.fingerprint import run_inputs
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ def _reading(plan: Plan, q: Quantity, row: dict, case: dict) -> Reading:
 
 def _comparison(plan: Plan, ladder: Ladder, runs: Runs) -> Path:
     overrides = (*plan.study.set, *ladder.set)
-    id = fingerprint({"case": plan.settings[plan.base].case, "ladder": ladder.model_dump(mode="json")})
+    case = plan.settings[plan.base].case
+    id = fingerprint({"case": case, "ladder": ladder.model_dump(mode="json"), **run_inputs(case)})
     place = runs.folder / f"laws-{ladder.name}-{id}"
     found, made_by = place / "comparison.json", place.with_suffix(".json")
     if found.exists() and made_by.exists() and (runs.any_version or _program(made_by) == runs.program):

@@ -20,6 +20,7 @@ from coupler.case.toml_text import inline
 from coupler.case.units import to_si
 from coupler.checks.read_case import CaseFile, load
 from coupler.program.errors import BadCase, UnitError
+from coupler.run.fingerprint import run_inputs
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ class _Settings:
         except BadCase as error:
             self.wrong += error.lines
             return ""
-        id = fingerprint(content)
+        id = identity(content)
         self.settings.setdefault(id, Setting(id, whole, content))
         return id
 
@@ -126,6 +127,13 @@ def fingerprint(case: dict) -> str:
     """Ten digits that tell one effective case from another."""
     text = json.dumps(case, sort_keys=True).encode()
     return hashlib.blake2b(text, digest_size=5).hexdigest()
+
+
+def identity(case: dict) -> str:
+    """Ten digits that tell one run from another: those of its effective case, and of what the files that it names and
+    its own joint laws contain, where it has any."""
+    inputs = run_inputs(case)
+    return fingerprint({"case": case, **inputs} if inputs else case)
 
 
 def _rungs(ladder: Ladder, ladders: dict[str, Ladder], made: _Settings, larger: bool):

@@ -23,7 +23,7 @@ from coupler.case.sweep_names import OWN, amount, design_problems, in_si, sweep_
 from coupler.case.toml_lines import shown
 from coupler.case.toml_text import inline
 from coupler.checks.read_case import CaseFile, load, parse_path
-from coupler.commands.study.plan import fingerprint
+from coupler.commands.study.plan import fingerprint, identity
 from coupler.commands.sweep.draw import cube, distribution, quantiles, seed_of, whole_numbers
 from coupler.commands.sweep.quantities import asked
 from coupler.commands.sweep.table_in import InputTable, read_table
@@ -277,7 +277,7 @@ class _Planner:
     def _add(self, overrides: tuple[str, ...], first: bool = False) -> str:
         """The id of the run with these overrides. Raises BadCase where they are no case."""
         content = effective(load(self.file.path, overrides).case)
-        id = fingerprint(content)
+        id = identity(content)
         if id not in self.runs:
             self.runs = {id: overrides, **self.runs} if first else {**self.runs, id: overrides}
             self.cases[id] = content
