@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from coupler.commands.study.runner import Cost
+from coupler.commands.sweep import command
+from coupler.commands.sweep.command import SweepRequest
 from coupler.commands.sweep.folder import figures, read_spec, write_spec
 from coupler.commands.sweep.fragility import curves, read_runs
 from coupler.commands.sweep.one import make, outcome_of
@@ -205,6 +207,20 @@ def test_quantities_may_be_asked_for_later_while_their_files_are_there(made, tmp
     spec = write_spec(tmp_path / "out", make_plan(tmp_path), 1)
     results = collect(spec)
     assert results.column("peak") == pytest.approx([0.5 * x for x in results.column("load")])
+
+
+def test_a_plan_that_is_only_shown_or_must_wait_leaves_the_sweep_as_it_is(made, tmp_path, monkeypatch):
+    """Workers read sweep.json before each run: another plan there made the runs that were left crash."""
+    made()
+    before = (tmp_path / "out" / "sweep.json").read_bytes()
+    other = ("joints.opening_at_failure=0.01,0.02",)
+    monkeypatch.setattr(command, "forecast", lambda *_: [])
+    assert command.sweep(tmp_path, SweepRequest(other, output=tmp_path / "out", plan=True)) == ExitCode.DONE
+    assert command.sweep(tmp_path, SweepRequest(other, output=tmp_path / "no", plan=True)) == ExitCode.DONE
+    with command._alone(tmp_path / "out"), pytest.raises(command.Busy):
+        command.sweep(tmp_path, SweepRequest(other, output=tmp_path / "out"))
+    assert (tmp_path / "out" / "sweep.json").read_bytes() == before
+    assert not (tmp_path / "no").exists()
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coupler.commands.sweep import page
-from coupler.commands.sweep.folder import Spec, ended, figures, write_spec
+from coupler.commands.sweep.folder import Spec, ended, figures, spec_of, write_spec
 from coupler.commands.sweep.forecast import forecast
 from coupler.commands.sweep.local import Local, free_cores
 from coupler.commands.sweep.one import FINAL
@@ -71,10 +71,10 @@ def sweep(case: Path, request: SweepRequest) -> ExitCode:
     _check(request)
     plan = make_plan(case, request.vary, request.set)
     folder = request.output or plan.file.directory / "runs" / "sweep"
-    spec = write_spec(folder, plan, request.threads)
     for remark in plan.remarks:
         print(f"note: {remark}")
     if request.plan:
+        spec = spec_of(folder, plan, request.threads)
         _show(plan)
         terminal.table(
             "forecast", forecast(spec, request.jobs or free_cores(request.threads), request.engine == "local")
@@ -83,14 +83,16 @@ def sweep(case: Path, request: SweepRequest) -> ExitCode:
     if request.export:
         from coupler.commands.sweep.snakemake import export
 
-        print(f"wrote {export(spec)}")
+        with _alone(folder):
+            print(f"wrote {export(write_spec(folder, plan, request.threads))}")
         return ExitCode.DONE
     if request.cancel is not None:
         from coupler.commands.sweep.slurm import cancel
 
-        print(cancel(spec, request.cancel))
+        print(cancel(spec_of(folder, plan, request.threads), request.cancel))
         return ExitCode.DONE
     with _alone(folder):
+        spec = write_spec(folder, plan, request.threads)
         stopped = _make(spec, request)
     return finish(spec, stopped)
 
@@ -110,7 +112,9 @@ def _check(request: SweepRequest) -> None:
 
 @contextlib.contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Allow one process at a time to make runs in a directory, where the file system has locks."""
+    """Allow one process at a time to plan and make runs in a directory, which is made, where the file system has
+    locks."""
+    folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("w") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

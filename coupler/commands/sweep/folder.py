@@ -45,21 +45,38 @@ class Spec:
         return self.folder / "runs" / id
 
 
+def spec_of(folder: Path, plan: Plan, threads: int) -> Spec:
+    """What a sweep in a directory would be by this plan; nothing is written."""
+    return Spec(
+        folder=folder.resolve(),
+        title=plan.file.case.case.title,
+        case_file=plan.file.path.resolve(),
+        sweep=plan.sweep,
+        columns=plan.columns,
+        rows=plan.rows,
+        runs=plan.runs,
+        remarks=plan.remarks,
+        threads=threads,
+        case=next(iter(plan.cases.values())),
+    )
+
+
 def write_spec(folder: Path, plan: Plan, threads: int) -> Spec:
-    """Write what is planned into the directory, which is made."""
+    """Write what is planned into the directory, which is made. Runs that are being made there read it again and again,
+    so no other plan may take its place until they are done."""
     (folder / "runs").mkdir(parents=True, exist_ok=True)
-    first = next(iter(plan.cases.values()))
+    spec = spec_of(folder, plan, threads)
     content = {
         "layout": LAYOUT,
-        "title": plan.file.case.case.title,
-        "case_file": str(plan.file.path.resolve()),
-        "sweep": plan.sweep.model_dump(mode="json", exclude_none=True),
-        "columns": [asdict(column) for column in plan.columns],
-        "rows": [asdict(row) for row in plan.rows],
-        "runs": {id: list(overrides) for id, overrides in plan.runs.items()},
-        "remarks": list(plan.remarks),
+        "title": spec.title,
+        "case_file": str(spec.case_file),
+        "sweep": spec.sweep.model_dump(mode="json", exclude_none=True),
+        "columns": [asdict(column) for column in spec.columns],
+        "rows": [asdict(row) for row in spec.rows],
+        "runs": {id: list(overrides) for id, overrides in spec.runs.items()},
+        "remarks": list(spec.remarks),
         "threads": threads,
-        "case": first,
+        "case": spec.case,
     }
     write_json(folder / NAME, content)
     return read_spec(folder)

@@ -57,7 +57,8 @@ def forecast(spec: Spec, jobs: int, forked: bool) -> list[Row]:
 
 
 def _free(spec: Spec) -> str:
-    return f"{shutil.disk_usage(spec.folder).free / 1e6:.4g} MB are free"
+    there = next(place for place in (spec.folder, *spec.folder.parents) if place.is_dir())
+    return f"{shutil.disk_usage(there).free / 1e6:.4g} MB are free"
 
 
 def _trial(spec: Spec) -> tuple[float, float, float, float]:
