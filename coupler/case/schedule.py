@@ -58,6 +58,16 @@ def checkpoint_interval(case: Case) -> float:
     return case.time.end / CHECKPOINTS if every is None else every
 
 
+def first_part(case: Case, end: float) -> tuple[str, ...]:
+    """Overrides KEY=VALUE with which a run of a case ends at `end` [s] after the first steps of the whole run: outputs
+    and checkpoints, which are at hundredths and tenths of a run by default, keep their intervals."""
+    return (
+        f"time.end={end!r}",
+        f"time.output_every={Schedule.of(case).interval!r}",
+        f"time.checkpoint_every={checkpoint_interval(case)!r}",
+    )
+
+
 def next_multiple(time: float, every: float) -> float:
     """The first multiple of an interval [s] after a time [s]."""
     return every * (_intervals(time, every) + 1)

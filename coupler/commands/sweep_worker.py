@@ -79,6 +79,7 @@ def _be(words: Sequence[str], log: Path, parent: int) -> None:
 
 def warm(spec: Spec, id: str) -> None:
     """Go through one step of a run in this process and forget it: YADE, kernels and libraries are loaded then."""
+    from coupler.case.schedule import first_part
     from coupler.checks.read_case import load
     from coupler.commands.warm_up import Silent
     from coupler.run.directory import RunDirectory
@@ -86,7 +87,7 @@ def warm(spec: Spec, id: str) -> None:
 
     file = load(spec.case_file, spec.runs[id])
     short = min(file.case.time.end, file.case.time.step_max)
-    file = load(spec.case_file, (*spec.runs[id], f"time.end={short!r}"))
+    file = load(spec.case_file, (*spec.runs[id], *first_part(file.case, short)))
     with (
         tempfile.TemporaryDirectory() as folder,
         RunDirectory.create(file, Path(folder) / "run") as directory,

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.case.schedule import Schedule, checkpoint_interval, next_multiple
+from coupler.case.schedule import Schedule, checkpoint_interval, first_part, next_multiple
 from coupler.checks.case import problems
 from coupler.run.forecast import _disk_remark
 from tests.physics.scenes import case
@@ -39,6 +39,19 @@ def test_the_interval_divides_the_first_end():
     assert Schedule.of(timed(end=1.0, output_every=5.0)) == Schedule(1.0, 1, 1.0)
     short, long = (Schedule.of(timed(end=end, output_every=0.01)) for end in (0.06, 0.1))
     assert [short.next_output(0.01 * k) for k in range(5)] == [long.next_output(0.01 * k) for k in range(5)]
+
+
+@pytest.mark.parametrize(
+    "own", [{}, {"output_every": 0.4, "checkpoint_every": 0.5}, {"checkpoint_every": 0.0}]
+)
+def test_the_first_part_of_a_run_has_the_steps_of_the_whole(own):
+    """By default its outputs were hundredths of the part, and each of them ended a step."""
+    whole = timed(end=8.0, **own)
+    words = dict(text.split("=") for text in first_part(whole, 0.02))
+    part = timed(**{key.removeprefix("time."): float(value) for key, value in words.items()})
+    assert part.time.end == 0.02
+    assert Schedule.of(part).next_output(0.0) == min(0.02, Schedule.of(whole).interval)
+    assert checkpoint_interval(part) == checkpoint_interval(whole)
 
 
 def test_more_outputs_than_anybody_can_read_are_refused():

@@ -223,6 +223,14 @@ def test_a_plan_that_is_only_shown_or_must_wait_leaves_the_sweep_as_it_is(made, 
     assert not (tmp_path / "no").exists()
 
 
+@pytest.mark.parametrize("keep", ["table", "histories", "all"])
+def test_the_disk_space_of_a_run_is_that_of_the_files_that_are_kept(made, keep):
+    spec, _ = made(keep=keep)
+    for id in spec.runs:
+        kept = sum(file.stat().st_size for file in spec.place(id).rglob("*") if file.is_file())
+        assert figures(spec, id)["disk"] == kept > 0
+
+
 @pytest.mark.parametrize(
     ("code", "summary", "outcome"),
     [

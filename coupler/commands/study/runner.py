@@ -20,6 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.case.schedule import first_part
+from coupler.checks.read_case import load
 from coupler.commands.study.plan import Plan, Setting
 from coupler.program.errors import BadCase, ExitCode
 from coupler.program.process import environment, trouble
@@ -132,10 +134,10 @@ class Runs:
 
     def _first_step(self, setting: Setting) -> FirstStep:
         """One step of a setting in a process of its own: it compiles what the case needs, once for all runs."""
-        place, time = self.folder / "first_step", setting.case["time"]
+        place, case = self.folder / "first_step", load(self.plan.file.path, setting.overrides).case
         shutil.rmtree(place, ignore_errors=True)
-        short = f"time.end={min(time['end'], time['step_max'])!r}"
-        cost, compiling = self._process((*setting.overrides, short), place)
+        short = first_part(case, min(case.time.end, case.time.step_max))
+        cost, compiling = self._process((*setting.overrides, *short), place)
         shutil.rmtree(place, ignore_errors=True)
         self.tell(f"first step: {cost.cpu_seconds:.1f} CPU s, {compiling:.1f} of them to compile")
         found = FirstStep(cost.cpu_seconds, compiling, cost.wall_seconds)

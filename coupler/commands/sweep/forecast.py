@@ -11,12 +11,14 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from coupler.case.schedule import Schedule, first_part
 from coupler.checks.read_case import load
 from coupler.commands.sweep.folder import Spec, ended
-from coupler.commands.sweep.one import Process
+from coupler.commands.sweep.one import Process, kept_files
 from coupler.program.errors import BadCase
 from coupler.program.process import trouble
 from coupler.program.terminal import Row, duration
+from coupler.results.vtkhdf import read_times
 from coupler.run.summary import read_summary
 
 STEPS = 3
@@ -80,14 +82,28 @@ def _first_steps(spec: Spec, id: str) -> tuple[float, float, float, float] | str
     short = min(end, STEPS * case.time.step_max)
     with tempfile.TemporaryDirectory() as folder:
         place, log = Path(folder) / "run", Path(folder) / "log"
-        sets = [w for o in (*spec.runs[id], f"time.end={short!r}") for w in ("--set", o)]
+        sets = [w for o in (*spec.runs[id], *first_part(case, short)) for w in ("--set", o)]
         cost = Process(spec.threads)(["run", str(spec.case_file), *sets, "--output", str(place)], log)
         if cost.exit_code:
             return trouble(cost.exit_code, log.read_text(encoding="utf-8", errors="replace"))
         figures = read_summary(place)["figures"]
-        disk = sum(f.stat().st_size for f in place.rglob("*") if f.is_file())
-    more = end / figures["time"]
+        more = end / figures["time"]
+        disk = _disk_of_whole(place, spec.sweep.keep, more, round(end / Schedule.of(case).interval) + 1)
     parts = figures["cpu_seconds"]
     steps = sum(seconds for part, seconds in parts.items() if part != "set-up")
     own = parts.get("set-up", 0.0) + steps
-    return cost.cpu_seconds - own, own + steps * (more - 1.0), cost.peak_memory, disk * more
+    return cost.cpu_seconds - own, own + steps * (more - 1.0), cost.peak_memory, disk
+
+
+def _disk_of_whole(place: Path, keep: str, more: float, states: int) -> float:
+    """Size [B] of the files that `keep` leaves of a run that takes `more` times as long as the one in `place` and
+    writes so many states: rows of its histories and its states grow, the rest stays."""
+    total = 0.0
+    for file in kept_files(place, keep):
+        size, grows = file.stat().st_size, 0.0
+        if file.parent.name == "history":
+            grows = (more - 1.0) * sum(len(line) for line in file.open("rb") if line[:1].isdigit())
+        elif file.suffix == ".vtkhdf" and file.name != "solids.vtkhdf":
+            grows = (states / max(len(read_times(file)), 1) - 1.0) * size
+        total += size + grows
+    return total

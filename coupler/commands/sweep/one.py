@@ -148,9 +148,14 @@ def _make(spec: Spec, id: str, execute: Execute) -> dict:
         cost = execute(["run", str(spec.case_file), *sets, "--output", str(place)], log)
     found = _record(spec, id, cost, before)
     write_figures(spec, id, found, found["outcome"] in FINAL)
-    if found["outcome"] in FINAL and found["outcome"] != "gave up":
+    if _tidied(found["outcome"]):
         _tidy(place, spec.sweep.keep)
     return found
+
+
+def _tidied(outcome: str) -> bool:
+    """Whether the files of a run that ended so are removed but for those to be kept."""
+    return outcome in FINAL and outcome != "gave up"
 
 
 def _may_go_on(spec: Spec, known: dict) -> bool:
@@ -185,7 +190,7 @@ def _record(spec: Spec, id: str, cost: Cost, before: dict) -> dict:
         ),
         "wall_seconds": cost.wall_seconds + before.get("wall_seconds", 0.0),
         "memory": max(cost.peak_memory, before.get("memory", 0)),
-        "disk": sum(f.stat().st_size for f in place.rglob("*") if f.is_file()),
+        "disk": disk_of(place, spec.sweep.keep if _tidied(outcome) else "all"),
         "attempts": before.get("attempts", 0) + 1,
         "cpu_limit": spec.sweep.cpu_seconds,
         "time": summary.get("figures", {}).get("time"),
@@ -213,15 +218,29 @@ def outcome_of(exit_code: int, summary: dict) -> str:
 
 def _tidy(place: Path, keep: str) -> None:
     """Remove the files of a run directory that are not to be kept."""
-    if keep == "all" or not place.is_dir():
-        return
-    for entry in place.iterdir():
-        if entry.name in LEFT[keep]:
+    for entry in place.iterdir() if place.is_dir() else ():
+        if _stays(entry, keep):
             continue
         if entry.is_dir():
             shutil.rmtree(entry)
         else:
             entry.unlink()
+
+
+def _stays(entry: Path, keep: str) -> bool:
+    return keep == "all" or entry.name in LEFT[keep]
+
+
+def disk_of(place: Path, keep: str) -> int:
+    """Size [B] of the files in a run directory that `keep` leaves there."""
+    return sum(file.stat().st_size for file in kept_files(place, keep))
+
+
+def kept_files(place: Path, keep: str) -> Iterator[Path]:
+    """The files in a run directory that `keep` leaves there."""
+    for entry in place.iterdir() if place.is_dir() else ():
+        if _stays(entry, keep):
+            yield from (file for file in (entry, *entry.rglob("*")) if file.is_file())
 
 
 def main(words: list[str]) -> int:
