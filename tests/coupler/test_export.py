@@ -80,6 +80,42 @@ def test_exporting_again_adds_only_what_is_new(run, tmp_path):
     assert not list(tmp_path.glob(".*.part"))
 
 
+def test_files_of_another_run_are_not_taken_for_those_of_this_one(run, tmp_path):
+    export(run, ["vtk"], tmp_path / "out", 0.0, np.inf, tell=lambda text: None)
+    other = write_run(tmp_path / "other", cell=4.0, times=np.linspace(0.0, 2.0, 4))
+    summary = json.loads((run / "run.json").read_text())
+    summary["case"]["case"]["title"] = "another"
+    (other / "run.json").write_text(json.dumps(summary))
+    with pytest.raises(CannotExport, match="another run"):
+        export(other, ["vtk"], tmp_path / "out", 0.0, np.inf)
+
+
+def test_states_are_written_again_after_the_run_was_resumed(run, tmp_path):
+    """It went back to a checkpoint: states after that may be others, with --any-version or other limits."""
+    own = shutil.copytree(run, tmp_path / "run")
+    export(own, ["vtk", "gltf"], tmp_path / "out", 0.0, np.inf, tell=lambda text: None)
+    old = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*_0*")}
+    summary = json.loads((own / "run.json").read_text())
+    (own / "run.json").write_text(json.dumps(summary | {"resumed": [{"at": "now", "time": 1.0}]}))
+    export(own, ["vtk", "gltf"], tmp_path / "out", 0.0, np.inf, tell=lambda text: None)
+    assert len(old) > 8
+    assert all(path.stat().st_mtime_ns > before for path, before in old.items())
+
+
+def test_all_scenes_have_one_scale_of_colours(run, tmp_path, monkeypatch):
+    """Those of a run in progress had that of the speeds until then."""
+    from coupler.commands.export import gltf
+
+    with monkeypatch.context() as patched:
+        patched.setattr(gltf, "_fastest", lambda water: 100.0)
+        export(run, ["gltf"], tmp_path, 0.0, 1.0, tell=lambda text: None)
+    export(run, ["gltf"], tmp_path, 0.0, np.inf, tell=lambda text: None)
+    export(run, ["gltf"], tmp_path / "once", 0.0, np.inf, tell=lambda text: None)
+    scenes = sorted((tmp_path / "once").glob("*.glb"))
+    assert len(scenes) == 4
+    assert all(scene.read_bytes() == (tmp_path / scene.name).read_bytes() for scene in scenes)
+
+
 def test_histories_say_their_units(run, exported):
     source = sorted((run / "history").glob("*.csv"))[0]
     table = read_history(source)

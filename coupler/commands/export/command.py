@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import time as clock
+import zlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from coupler.commands.export.stored import keep_if, made_of
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.program.quantities import quantity
 from coupler.results.vtkhdf import UNREADABLE
 from coupler.run.summary import read_summary
 
 FORMATS = ("vtk", "netcdf", "gltf")
+STEPS = ("water_[0-9]*.vtu", "blocks_[0-9]*.vtu", "solids.vtu", "scene_[0-9]*.glb")
+"""Files that a repeated export keeps."""
 
 
 class CannotExport(SurgebreakError):
@@ -25,11 +30,28 @@ def export(run: Path, formats: list[str], to: Path | None, begin: float, end: fl
     wrong = [name for name in formats if name not in FORMATS]
     if wrong:
         raise CannotExport(f"--format {wrong[0]}: no such format; there are {', '.join(FORMATS)}")
-    title = read_summary(run)["case"]["case"]["title"]
+    summary = read_summary(run)
+    title = summary["case"]["case"]["title"]
     folder = to or run / "export"
     folder.mkdir(parents=True, exist_ok=True)
+    _begin(folder, summary)
     for name in formats:
         _reported(name, _writer(name, run, folder, title, lambda t: begin <= t <= end), folder, tell)
+
+
+def _begin(folder: Path, summary: dict) -> None:
+    """Make sure that the files in a directory, which are not written again, are those of this run, and of its states
+    since it was last resumed.  Raises CannotExport."""
+    case = {
+        name: part for name, part in summary["case"].items() if name not in ("time", "coupling", "limits")
+    }
+    run = [summary["started"], zlib.crc32(json.dumps(case, sort_keys=True).encode())]
+    if made_of(folder).get("run", run) != run:
+        raise CannotExport(
+            f"{folder} holds the files of another run; give --to another directory, or remove it"
+        )
+    keep_if(folder, "run", run, STEPS)
+    keep_if(folder, "resumed", len(summary.get("resumed", [])), STEPS)
 
 
 def _writer(name: str, run: Path, to: Path, title: str, chosen: Callable[[float], bool]) -> Iterable[Path]:

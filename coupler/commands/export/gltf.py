@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from array_types import Array
-from coupler.commands.export.stored import Stored, stored
+from coupler.commands.export.stored import Stored, keep_if, stored
 from coupler.commands.view import palette
 from coupler.commands.view.water_surface import shading_normals, skin
 from coupler.program.extras import need
@@ -31,6 +31,9 @@ def write_gltf(run: Path, to: Path, chosen: Callable[[float], bool]) -> Iterator
     names = _names(run / "blocks.vtkhdf") if blocks else []
     times = (water or blocks).times if (water or blocks) else []
     top = _fastest(water) if water else 1.0
+    keep_if(
+        to, "fastest", top, ("scene_[0-9]*.glb",)
+    )  # files of a run in progress had another scale of colours
     for k, time in enumerate(times):
         path = to / f"scene_{k:05d}.glb"
         if chosen(float(time)) and not path.exists():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,10 @@ import numpy as np
 
 from array_types import Array
 from coupler.results import vtkhdf
+from coupler.run.directory import write_json
 
+MADE_OF = ".made_of.json"
+"""Name of the file that says in a directory what those beside it were made of."""
 Cells = list[tuple[str, Array, Array]]
 """Kind as meshio names it, corners (m, k), and the numbers (m,) of these cells in the file."""
 
@@ -42,6 +46,25 @@ def stored(path: Path) -> Stored:
         origin = np.array(file["scene"].attrs["origin"])
     polygons = polygon_cells(*vtkhdf.read_polygons(path)) if faces and len(vtkhdf.read_times(path)) else None
     return Stored(path, vtkhdf.read_times(path), origin, polygons)
+
+
+def made_of(folder: Path) -> dict:
+    """What the files in a directory were made of, by name; empty where none were."""
+    try:
+        return json.loads((folder / MADE_OF).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return {}
+
+
+def keep_if(folder: Path, what: str, value: object, names: tuple[str, ...]) -> None:
+    """Remove the files with these names (patterns) from a directory unless `what` they were made of has this value, and
+    record it for those to come."""
+    known = made_of(folder)
+    if known.get(what) == value:
+        return
+    for path in (path for name in names for path in folder.glob(name)):
+        path.unlink()
+    write_json(folder / MADE_OF, known | {what: value})
 
 
 def _moved(points: Array, origin: Array) -> Array:
