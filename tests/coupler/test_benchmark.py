@@ -8,7 +8,7 @@ import pytest
 
 from coupler.commands.benchmark import command, cutting, debris, part, scenes, solver, water
 from coupler.commands.benchmark.command import Line
-from coupler.program.errors import ExitCode
+from coupler.program.errors import BadCase, ExitCode
 from yade_scripts.blocks.faces import touching_faces
 
 
@@ -96,7 +96,7 @@ def test_one_group_may_be_chosen_and_an_unknown_one_is_refused(monkeypatch, caps
     monkeypatch.setattr(command, "GROUPS", groups)
     assert command.benchmark(quick=True, as_json=True, only="water") == ExitCode.DONE
     assert [line["what"] for line in json.loads(capsys.readouterr().out)["lines"]] == ["water"]
-    with pytest.raises(command.PartFailed, match="choose one of joints, water"):
+    with pytest.raises(BadCase, match="choose one of joints, water"):
         command.benchmark(quick=True, as_json=True, only="wat")
 
 

@@ -56,6 +56,9 @@ def test_scenes_are_chosen_by_id_group_and_cost():
     assert {s.cost for s in runner.chosen([], quick=True)} == {"S"}
     assert [s.id for s in runner.chosen(["s42"], quick=False)] == ["S42"]
     assert runner.chosen(["structure"], quick=False) == [s for s in everything if s.group == "structure"]
+    slow = next(s.id for s in everything if s.cost == "M")
+    with pytest.raises(BadCase, match=f"--quick leaves out {slow}"):
+        runner.chosen([slow], quick=True)
     with pytest.raises(BadCase, match="unknown scene"):
         runner.chosen(["S999"], quick=False)
 

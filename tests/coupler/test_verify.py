@@ -61,6 +61,8 @@ def test_unknown_and_absent_cases_are_distinguished(monkeypatch):
 
 def test_quick_leaves_the_long_cases_out():
     assert {case.cost for case in runner.chosen([], quick=True)} == {"S"}
+    with pytest.raises(BadCase, match="--quick leaves out P23"):  # or it would end well without a check
+        runner.chosen(["P23"], quick=True)
 
 
 def test_a_process_that_dies_is_a_failed_result_with_its_last_words():

@@ -13,7 +13,8 @@ TIME_LIMIT = {"S": 600, "M": 3600}
 
 
 def chosen(ids: list[str], quick: bool) -> list[Scene]:
-    """The scenes asked for, by id or group; all without; with quick only those of cost S. Raises BadCase."""
+    """The scenes asked for, by id or group; all without; with quick only those of cost S. Raises BadCase, also where
+    none is left."""
     known = scenes()
     groups = sorted({s.group for s in known.values()})
     names = [*known, *groups]
@@ -26,7 +27,10 @@ def chosen(ids: list[str], quick: bool) -> list[Scene]:
         raise BadCase(wrong)
     words = {word.upper() for word in ids} | set(ids)
     found = [s for s in known.values() if not ids or s.id in words or s.group in words]
-    return [s for s in found if s.cost == "S" or not quick]
+    left = [s for s in found if s.cost == "S" or not quick]
+    if not left:
+        raise BadCase([f"--quick leaves out {', '.join(s.id for s in found)}: each takes minutes"])
+    return left
 
 
 def run(scene: Scene) -> Outcome:

@@ -14,13 +14,17 @@ TIME_LIMIT = {"S": 1800, "M": 2 * 3600, "L": 6 * 3600}
 
 
 def chosen(ids: list[str], quick: bool) -> list[Check]:
-    """The cases asked for; all without ids; with quick only those of cost S. Raises BadCase for unknown ids."""
+    """The cases asked for; all without ids; with quick only those of cost S. Raises BadCase for unknown ids, and where
+    none is left."""
     known = checks()
     wrong = [_unknown(id, known) for id in ids if id.upper() not in known]
     if wrong:
         raise BadCase(wrong)
     found = [known[id.upper()] for id in ids] if ids else list(known.values())
-    return [case for case in found if case.cost == "S" or not quick]
+    left = [case for case in found if case.cost == "S" or not quick]
+    if not left:
+        raise BadCase([f"--quick leaves out {', '.join(case.id for case in found)}: each takes minutes"])
+    return left
 
 
 def _unknown(id: str, known) -> str:
