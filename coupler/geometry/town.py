@@ -14,8 +14,10 @@ from coupler.case.case import Case
 from coupler.case.structure import Building
 from coupler.case.types import Rotation
 from coupler.geometry.footprints import (
+    SAME,
     Footprint,
     FootprintError,
+    area_of,
     best_rectangle,
     epsg_code,
     read_footprints,
@@ -61,10 +63,8 @@ def _houses(town, tank, terrain, _stamp) -> tuple[Building, ...]:
         _same_system(path.name, footprints[0].system, terrain)
     for footprint in footprints:
         corners = np.column_stack(tank.ground.in_tank(*(terrain.scale * footprint.corners).T))
-        if _is_here(path.name, footprint, corners, tank):
+        if area_of(corners) >= town.least_area and _is_here(path.name, footprint, corners, tank):
             house = _house(path.name, town, footprint, corners)
-            if house is None:
-                continue
             if house.name in names:
                 raise FootprintError(
                     f"{path.name}: two houses called '{house.name}'; name_from must tell them apart"
@@ -107,8 +107,9 @@ def _advice(footprints: list[Footprint], town) -> str:
 
 def _is_here(name: str, footprint: Footprint, corners: Array, tank) -> bool:
     """Whether a footprint lies in the tank; one across its side is refused."""
-    inside = ((corners >= tank.lower[:2]) & (corners <= tank.upper[:2])).all(axis=1)
-    if inside.any() and not inside.all():
+    low, high = np.array(tank.lower[:2]), np.array(tank.upper[:2])
+    inside = ((corners >= low) & (corners <= high)).all(axis=1)
+    if not inside.all() and _reaches_into(corners, low, high):
         x, y = corners[~inside][0]
         raise FootprintError(
             f"{name}: feature {footprint.number} lies across the side of the tank, at ({x:.5g}, {y:.5g}) m; "
@@ -117,12 +118,25 @@ def _is_here(name: str, footprint: Footprint, corners: Array, tank) -> bool:
     return bool(inside.all())
 
 
-def _house(name: str, town, footprint: Footprint, corners: Array) -> Building | None:
-    """One building; None for a footprint smaller than a house."""
-    from coupler.geometry.footprints import area_of
+def _reaches_into(corners: Array, low: Array, high: Array) -> bool:
+    """Whether a polygon (k, 2) shares an area with a rectangle low (2,) .. high (2,) that does not hold all of it: an
+    edge passes through, or the whole rectangle lies within."""
+    ahead = np.roll(corners, -1, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounds = np.stack([low - corners, high - corners]) / (ahead - corners)
+    enters, leaves = bounds.min(axis=0).max(axis=1), bounds.max(axis=0).min(axis=1)
+    if (np.minimum(leaves, 1.0) - np.maximum(enters, 0.0) > SAME).any():
+        return True
+    x, y = 0.5 * (low + high)
+    passes = (corners[:, 1] > y) != (ahead[:, 1] > y)
+    at = corners[passes, 0] + (y - corners[passes, 1]) * (
+        (ahead[passes, 0] - corners[passes, 0]) / (ahead[passes, 1] - corners[passes, 1])
+    )
+    return bool(np.count_nonzero(at > x) % 2)
 
-    if area_of(corners) < town.least_area:
-        return None
+
+def _house(name: str, town, footprint: Footprint, corners: Array) -> Building:
+    """One building."""
     middle, size, turn, share = best_rectangle(corners)
     if town.shape == "outline" and share < RECTANGLE:
         low = corners.min(axis=0)

@@ -156,6 +156,13 @@ def test_the_first_footprint_without_storeys_is_told_by_the_number_of_its_featur
     )
 
 
+def test_footprints_beside_the_tank_and_sheds_across_its_side_are_left_out(tmp_path):
+    beside = [feature(ring((44, 15), (8, 6)), id="c"), feature(ring((43, 33), (4, 4), 45), id="d")]
+    shed = feature(ring((40, 8), (2, 1)), id="e")
+    case = loaded(tmp_path, "structure.town[0].least_area=5", houses=[*HOUSES, *beside, shed])
+    assert [part.name for part in parts_of(case)] == ["a", "b"]
+
+
 ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
 
 
@@ -172,6 +179,12 @@ ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
             [],
             r"feature 0 lies across the side of the tank, at \(43.5",
         ),
+        (  # no corner of it in the tank
+            [feature(ring((40.5, 30.5), (4, 4), 45), id="a")],
+            [],
+            r"feature 0 lies across the side of the tank, at \(4",
+        ),
+        ([feature(ring((20, 15), (90, 80)), id="a")], [], "feature 0 lies across the side of the tank"),
         ([feature(ring((10, 8), (6, 6)), id="a")], [], r"'a' stands at z = -0.7 m under 0.7 m of the water"),
         ([*HOUSES, feature(ring((33, 9), (6, 6)), id="c")], [], r"'c' at \(33, 9\) m overlaps 'a' by"),
         ([HOUSES[0], HOUSES[0]], [], "two houses called 'a'"),
