@@ -54,6 +54,7 @@ def changed(**values):
         ({"error": 0.109}, ExitCode.DONE),
         ({"error": 0.111}, ExitCode.DIVERGED),
         ({"error": 0.001}, ExitCode.DONE),
+        ({"error": None}, ExitCode.DIVERGED),
         ({"cpu_seconds": 11.9}, ExitCode.DONE),
         ({"cpu_seconds": 12.1}, ExitCode.DIVERGED),
         ({"reason": "diverged"}, ExitCode.DIVERGED),

@@ -15,7 +15,8 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Worse:
-    """One value that got worse: its name, the value before and now, and the largest ratio allowed (0: it failed)."""
+    """One value that got worse: its name, the value before and now, and the largest ratio allowed; reason: why there is
+    no value now."""
 
     what: str
     before: float
@@ -73,7 +74,7 @@ def refuse(before: dict, now: dict) -> None:
 
 
 def worse(before: dict, now: dict, error: float, cpu: float) -> list[Worse]:
-    """Everything that grew by more than its limit, and runs that fail now."""
+    """Everything that grew by more than its limit, and runs and errors that are not there now."""
     then, found = _points(before), []
     for name, point in _points(now).items():
         if name not in then or then[name]["reason"]:
@@ -91,9 +92,14 @@ def worse(before: dict, now: dict, error: float, cpu: float) -> list[Worse]:
 def _errors(what: str, before: dict, now: dict, limit: float):
     for name in before.keys() & now.keys():
         old, new = before[name]["error"], now[name]["error"]
-        if old is None or new is None or not math.isfinite(old):
+        if old is None or not math.isfinite(old):
             continue
-        if new > limit * max(old, NEGLIGIBLE):
+        if new is None or not math.isfinite(new):
+            why = now[name].get("why")
+            yield Worse(
+                f"{what}: error of {name}", old, math.nan, 0.0, f"none now{f': {why}' if why else ''}"
+            )
+        elif new > limit * max(old, NEGLIGIBLE):
             yield Worse(f"{what}: error of {name}", max(old, NEGLIGIBLE), new, limit)
 
 
