@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from coupler.program import extras
 from coupler.program.process import run_module
@@ -45,16 +47,24 @@ def study_figures(study: Path) -> str:
 
 
 def draw(module: str, folder: Path) -> None:
-    """Figures of a comparison or a study beside its tables; where the extra is absent, a line says so instead."""
-    absent = missing()
-    if absent:
-        print(f"no figures: {absent}")
-        return
-    run_module(module, folder, check=True)
+    """Figures of a comparison or a study beside its tables; where there are none, a line says why."""
+    reason = missing() or figures(module, folder)
+    if reason:
+        print(f"no figures: {reason}")
+
+
+def figures(module: str, *words: object, **options: Any) -> str:
+    """Figures by a process that prints what it draws; the reason if they could not be drawn. options: of
+    `run_module`."""
+    return _why_not(module, run_module(module, *words, stderr=subprocess.PIPE, text=True, **options))
 
 
 def _view(module: str, *words: object) -> str:
-    done = run_module(module, *words, capture_output=True, text=True)
+    return _why_not(module, run_module(module, *words, capture_output=True, text=True))
+
+
+def _why_not(module: str, done: subprocess.CompletedProcess) -> str:
+    """The last words of a process that failed; empty of another one."""
     if done.returncode == 0:
         return ""
     lines = done.stderr.strip().splitlines()

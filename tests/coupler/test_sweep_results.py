@@ -223,6 +223,14 @@ def test_a_plan_that_is_only_shown_or_must_wait_leaves_the_sweep_as_it_is(made, 
     assert not (tmp_path / "no").exists()
 
 
+def test_a_figure_that_cannot_be_drawn_takes_nothing_else_with_it(made, monkeypatch, capsys):
+    spec, _ = made()
+    monkeypatch.setenv("MPLBACKEND", "none_of_these")
+    assert command.finish(spec, stopped=False) == ExitCode.DONE
+    assert "no figures: " in capsys.readouterr().out
+    assert (spec.folder / "report.html").exists()
+
+
 @pytest.mark.parametrize("keep", ["table", "histories", "all"])
 def test_the_disk_space_of_a_run_is_that_of_the_files_that_are_kept(made, keep):
     spec, _ = made(keep=keep)

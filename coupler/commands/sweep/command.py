@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from coupler.commands import pictures
 from coupler.commands.sweep import page
 from coupler.commands.sweep.folder import Spec, ended, figures, spec_of, write_spec
 from coupler.commands.sweep.forecast import forecast
@@ -20,7 +21,6 @@ from coupler.commands.sweep.results import Results, collect, write_tables
 from coupler.program import terminal
 from coupler.program.errors import BadCase, ExitCode, SurgebreakError
 from coupler.program.extras import missing
-from coupler.program.process import run_module
 from coupler.run.fingerprint import differences, program
 
 ENGINES = (
@@ -235,11 +235,9 @@ def finish(spec: Spec, stopped: bool) -> ExitCode:
         print(f"table: {path}")
     if any(record["outcome"] != "not yet" for record in results.records):
         page.analyse(spec, results)
-        absent = missing("sweep")
-        if absent:
-            print(f"note: no figures: {absent}")
-        else:
-            run_module("coupler.commands.view.sweep", spec.folder, check=True)
+        reason = missing("sweep") or pictures.figures("coupler.commands.view.sweep", spec.folder)
+        if reason:
+            print(f"note: no figures: {reason}")
     print(f"report: {page.write(spec, results)}")
     print(_summary(results))
     left = any(record["outcome"] not in FINAL for record in results.records)

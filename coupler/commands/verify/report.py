@@ -7,10 +7,10 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from coupler.commands.pictures import figures
 from coupler.commands.verify.registry import NOT_COVERED, Check, Result
 from coupler.commands.verify.runner import chosen, run
 from coupler.program.errors import ExitCode
-from coupler.program.process import run_module
 
 HEAD = ("case", "quantity", "value", "expected", "error", "limit", "", "cpu s")
 FORM = "{:5} {:73} {:>12} {:>12} {:>9} {:>8} {:8} {:>7}"
@@ -46,7 +46,9 @@ def draw(plots: Path, ids: list[str]) -> None:
     """Draw the figures that the cases left, in a process of its own, and list the pictures on stderr."""
     there = [str(path) for id in ids if (path := plots / f"{id}.json").exists() and path.stat().st_size]
     if there:
-        run_module("coupler.commands.view.curves", plots, *there, check=True, stdout=sys.stderr)
+        reason = figures("coupler.commands.view.curves", plots, *there, stdout=sys.stderr)
+        if reason:
+            print(f"no figures: {reason}", file=sys.stderr)
 
 
 def head() -> str:
