@@ -2,8 +2,8 @@
 
 An open top lets water go, so that depths and loads come out too small; a closed one is a lid that the water presses
 against. The water is followed at the nodes at the level of the top, except those at which it stood at the start. The
-surface creeps towards a wall that holds it and hardly passes the last node, so a quarter of a cell below the top counts
-as reached.
+surface creeps towards a wall that holds it and hardly passes the last node, so a quarter of a cell of its place below
+the top counts as reached.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class TankTop:
         nodes = water.mesh.nodes
         self._top = np.flatnonzero(nodes[:, 2] >= self.height - NEAR * (self.height - low))
         self._places = nodes[self._top, :2]
-        self._reached = REACHED * water.mesh.finest
+        self._reached = REACHED * water.mesh.node_size[self._top]
         self._at_start = self._wet(water)
         self.first, self.place, self.share, self.share_at = NEVER, np.zeros(2), 0.0, NEVER
 
@@ -46,7 +46,7 @@ class TankTop:
         for copy in range(int((last - first).max(initial=0))):
             has = np.flatnonzero(first + copy < last)
             own = first[has] + copy
-            found[has] |= water.topology.active[own] & (water.level_set[own] < self._reached)
+            found[has] |= water.topology.active[own] & (water.level_set[own] < self._reached[has])
         return found
 
     def step(self, water: Water, time: float) -> bool:

@@ -67,6 +67,15 @@ def test_a_run_tells_when_and_where_water_reached_the_top_and_that_loads_are_dou
     assert "force on plate" in log
 
 
+def test_finer_cells_elsewhere_do_not_hide_it(tmp_path):
+    """A quarter of the finest cell of the tank is a sixteenth of those at the top, within which no surface came."""
+    fine = "[[tank.refine]]\nlower = [0, 0, 0]\nupper = [0.2, 0.2, 0.1]\nlevels = 2\n"
+    water = CASE.partition("[structure]")[0].replace("[4, 0, 0]", "[2.8, 0, 0]").replace("0.5 s", "0.32 s")
+    for name, text in (("plain", water), ("fine", water.replace("[[water.fill]]", f"{fine}[[water.fill]]"))):
+        (tmp_path / name).mkdir()
+        assert "tank_top" in read_summary(run_of(tmp_path / name, text))["figures"], name
+
+
 def test_water_that_stays_below_is_not_told(tmp_path):
     low = CASE.replace("velocity = [4, 0, 0]", "").replace("0.5 s", "0.1 s")
     run = run_of(tmp_path, low)
@@ -97,7 +106,7 @@ def test_a_verdict_without_water_at_the_structure_is_doubtful(tmp_path):
 def column(wet):
     """Water on a mesh of two nodes at the top and two below."""
     nodes = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [1, 0, 1]], float)
-    mesh = SimpleNamespace(finest=1.0, nodes=nodes, bounds=np.array([[0, 0, 0], [1, 0, 1]], float))
+    mesh = SimpleNamespace(node_size=np.ones(4), nodes=nodes, bounds=np.array([[0, 0, 0], [1, 0, 1]], float))
     domain = SimpleNamespace(parent_node=np.array([0, 1, 2, 3, 3]))
     topology = SimpleNamespace(active=np.ones(5, bool))
     return SimpleNamespace(mesh=mesh, domain=domain, topology=topology, level_set=np.where(wet, -1.0, 1.0))
