@@ -15,6 +15,7 @@ from yade_scripts.dynamics.timestep import (
     DRIVEN_SHARE,
     STABLE_SHARE,
     SubstepTooLong,
+    contact_limits,
     exact_joint_frequency,
 )
 from yade_scripts.joints.cohesion import JointParameters
@@ -218,6 +219,16 @@ def test_a_block_that_nothing_else_moving_can_meet_has_the_longer_limit():
         with standing(CUBE, count, law) as s:
             limits.append(s.substep_limit().stable)
     assert limits[0] / limits[1] == pytest.approx(np.sqrt(2.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("e", [1e-7, 1e-6, 1e-5, 1e-4])
+def test_the_limit_of_contacts_is_found_for_next_to_no_restitution(e):
+    """The dashpot alone decides about it then, so that it is a number of the shape over ζ; the search for it did not
+    end."""
+    block, times_zeta = Block("b", (0, 0, 0.5), size=1.0, density=2000.0), []
+    for law in (ContactLaw(K, restitution=e), ContactLaw(K, restitution=1e-3)):
+        times_zeta.append(contact_limits([block], np.array([K]), law)[0] * law.damping_ratio)
+    assert times_zeta[0] == pytest.approx(times_zeta[1], rel=1e-3)
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])

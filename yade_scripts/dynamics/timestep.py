@@ -55,6 +55,8 @@ STABLE_SHARE = 0.9
 faces are stiffer than normal ones; elsewhere `CONTACT_SHARE` is shorter, for boxes from e = 0.06 on."""
 ROUNDING = 1e-9
 """Relative accuracy to which the explicit limit of contacts is found."""
+TINY = float(np.finfo(float).tiny)
+"""Absolute accuracy of it, so that the relative one decides; that of scipy, 2e-12, is too coarse for short limits."""
 DRIVEN_SHARE = 0.002
 DENSE = 60
 """Unknowns up to which the exact frequency is found with full matrices."""
@@ -243,7 +245,8 @@ def _contact_limit(block: Block, count: float, law: ContactLaw) -> float:
         worst = int(np.argmax(largest))
         if largest[worst] <= 1.0 + ROUNDING:
             return dt
-        dt = float(brentq(lambda t, pair: acting(t, pair)[0] - 1.0, 0.0, dt, args=(pairs[worst, None],)))
+        pair = pairs[worst, None]
+        dt = float(brentq(lambda t, pair: acting(t, pair)[0] - 1.0, 0.0, dt, (pair,), TINY, 0.1 * ROUNDING))
 
 
 def _stiffness_of_faces(block: Block, per_edge: int) -> tuple[Array, Array, Array]:
