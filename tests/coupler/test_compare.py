@@ -16,7 +16,7 @@ from coupler.commands.compare.matching import matched
 from coupler.commands.compare.outcome import Exact, Outcome, curve_error, errors, exact_answers
 from coupler.commands.compare.plan import OwnLaw, general_limits, make_plan
 from coupler.commands.compare.report import COLUMNS, rows, table, write
-from coupler.commands.compare.run import run_plan
+from coupler.commands.compare.run import LawFailed, run_plan
 from coupler.program.errors import BadCase
 from coupler.program.provenance import ROOT
 from yade_scripts.joints.cohesion import JointParameters
@@ -70,6 +70,20 @@ def test_a_case_without_joints_is_refused(tmp_path):
     (tmp_path / "case.toml").write_text(head + tail[tail.index("[[gauge]]") :], encoding="utf-8")
     with pytest.raises(BadCase, match="there are no joints"):
         make_plan(tmp_path, [], [], [1], 100)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ["joints.distribution=weibull", "joints.variation=0.2"],
+        ["joints.pair=[{between = ['held', 'moved'], strength = 2e6}]"],
+        ["structure.block[0].material=concrete", "structure.block[1].material=concrete"],
+    ],
+)
+def test_joints_that_differ_from_one_another_are_refused_before_anything_runs(changes):
+    """By pairs, by chance, or by presets of materials: the reference had been run first, and ended with a traceback."""
+    with pytest.raises(BadCase, match="gives all joints one law"):
+        make_plan(PULLED, changes, ["bilinear"], [1], 100)
 
 
 def test_what_no_stock_scene_matches_follows_from_the_case():
@@ -185,6 +199,23 @@ def test_a_comparison_runs_the_scripts_it_writes(tmp_path):
     shutil.copy(script, alone)
     subprocess.run(["yade", "-x", "-n", "-j1", script.name], cwd=alone, capture_output=True, check=True)
     assert (alone / "cohfrict.csv").read_bytes() == script.with_suffix(".csv").read_bytes()
+
+
+@needs_yade
+def test_substeps_at_which_a_law_is_unstable_are_left_out_and_told(tmp_path):
+    """Two cubes let go: their joint is stable up to ten substeps. The comparison had ended there, without its table."""
+    changes, told = ["motion=absent", "gauge=absent"], []
+    plan = make_plan(PULLED, changes, ["bilinear"], [1, 2, 20], 50)
+    found = run_plan(plan, tmp_path, told.append)
+    assert [(o.law.name, o.multiple) for o in found] == [
+        (law, m) for m in (1, 2) for law in ("polynomial", "bilinear")
+    ]
+    assert [text.split(",")[0] for text in told if "left out" in text] == ["polynomial", "bilinear"]
+    assert "unstable beyond" in told[-1]
+    other = tmp_path / "other"
+    other.mkdir()
+    with pytest.raises(LawFailed, match=r"20 x the substep: .* unstable beyond"):
+        run_plan(make_plan(PULLED, changes, ["bilinear"], [20], 50), other, told.append)
 
 
 def test_the_figure_is_made_from_the_files_alone(tmp_path):

@@ -2,7 +2,8 @@
 and figures.
 
 The structure is built and moved as in a run of the case; the columns and figures are those of the stock scripts
-(yade_scripts/stock/driver.py).
+(yade_scripts/stock/driver.py). Where its motion would be unstable at the substep, there is no table, and the only
+figure is TOO_LONG, the reason.
 """
 
 from __future__ import annotations
@@ -21,10 +22,13 @@ from coupler.run.clock import Clock
 from coupler.scene.build import build
 from yade_scripts.blocks.faces import touching_faces
 from yade_scripts.dynamics.description import local_origin, moved_block
+from yade_scripts.dynamics.timestep import SubstepTooLong
 from yade_scripts.joints.cohesion import JointParameterError
 from yade_scripts.stock.scene import described
 
 COLUMNS = ("time", "displacement", "force", "kinetic", "stored", "work", "dissipated", "joints_broken")
+
+TOO_LONG = "too_long"
 
 CHUNKS = 50
 """Calls of `advance` in the run that is timed: as few as a long run has, since a record is not part of the cost."""
@@ -49,7 +53,7 @@ class Request:
 
 
 def run(request: Request) -> tuple[list[tuple], dict]:
-    """Rows of COLUMNS and the figures of a run."""
+    """Rows of COLUMNS and the figures of a run. Raises SubstepTooLong."""
     file = load(Path(request.case), request.overrides)
     structure = build(file.case, Clock()).coupling.structure
     own = structure.stable_substep()[0]
@@ -125,10 +129,14 @@ def row(structure) -> tuple:
 def main() -> None:
     """Read the request, run, write STEM.csv and STEM.json."""
     request = Request(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
-    rows, figures = run(request)
+    path = Path(request.folder) / f"{request.stem}.json"
+    try:
+        rows, figures = run(request)
+    except SubstepTooLong as error:
+        path.write_text(json.dumps({TOO_LONG: str(error)}), encoding="utf-8")
+        return
     with (Path(request.folder) / f"{request.stem}.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([COLUMNS, *rows])
-    path = Path(request.folder) / f"{request.stem}.json"
     path.write_text(json.dumps(figures), encoding="utf-8")
 
 

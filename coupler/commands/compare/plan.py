@@ -105,6 +105,12 @@ def refuse(file: CaseFile) -> None:
         )
     if case.structure is None or case.joints is None:
         lines.append(f"{file.path}: joints: there are no joints, so there are no laws to compare")
+    elif case.joints.pair or case.joints.distribution:
+        lines.append(
+            f"{file.path}: joints: `compare` gives all joints one law, and the stock laws know neither joints.pair nor "
+            "joints.distribution nor materials with joints of their own (presets). Leave these out and give "
+            "joints.strength and joints.opening_at_failure, or compare our own laws by `run --set joints.law=NAME`"
+        )
     if lines:
         raise BadCase(lines)
 
