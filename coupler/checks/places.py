@@ -20,6 +20,7 @@ from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import beside_mesh, is_basin, is_measured, mesh_of, tank_places, what_of
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.geometry.terrain.grid import TerrainError
+from coupler.results.gauges import patch_points
 
 Placed = tuple[KeyPath, str, Body]
 
@@ -323,13 +324,23 @@ def _gauges(case: Case, held: list[Placed]) -> Iterator[Problem]:
             yield (*path, "every"), "is for the rows of each block; add each_block = true"
         if gauge.kind not in ("motion", "reaction", "loads") and case.water is None:
             yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
+        elif gauge.kind == "reaction" and case.structure is None:
+            yield (
+                (*path, "kind"),
+                f"'{gauge.name}' measures what holds blocks, and there is no section [structure]; of a fixed solid "
+                "take a gauge of kind force or loads",
+            )
         elif gauge.kind == "volume":
-            yield from _corners_in_order(path, gauge)
+            yield from _volume(case, path, gauge)
         elif (
             gauge.kind in ("level", "pressure", "patch", "air", "velocity", "flux") and case.tank is not None
         ):
-            yield from _gauge_place(case, path, gauge, held)
-            yield from _patch(path, gauge)
+            placed = list(_gauge_place(case, path, gauge, held))
+            shapeless = list(_patch(path, gauge))
+            yield from placed
+            yield from shapeless
+            if gauge.kind == "patch" and not placed and not shapeless:
+                yield from _patch_in_tank(case, path, gauge)
 
 
 def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
@@ -341,6 +352,41 @@ def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
     edges = getattr(gauge, "edges", None)
     if edges is not None and not np.any(np.cross(*edges)):
         yield (*path, "edges"), f"the edges of '{gauge.name}' are parallel: the patch has no area"
+
+
+def _patch_in_tank(case: Case, path: KeyPath, gauge) -> Iterator[Problem]:
+    """Patches that reach out of the tank, where no water can be asked for its pressure."""
+    points = patch_points(gauge)
+    if case.tank.is_box:
+        slack = 1e-10 * case.tank.cell  # as far as cells are found
+        outside = (points < np.subtract(case.tank.lower, slack)) | (points > np.add(case.tank.upper, slack))
+        beyond = outside.any(axis=1)
+    else:
+        beyond = mesh_of(case.tank).locate(points) < 0
+    if beyond.any():
+        x, y, z = points[np.argmax(beyond)]
+        yield (
+            path,
+            f"'{gauge.name}' reaches out of the tank: no cell is at ({x:.4g}, {y:.4g}, {z:.4g}) m; make the patch "
+            "smaller, or move it inside",
+        )
+
+
+def _volume(case: Case, path: KeyPath, gauge) -> Iterator[Problem]:
+    """Boxes of volume gauges with corners in the wrong order, or wholly beside the tank."""
+    disorder = list(_corners_in_order(path, gauge))
+    yield from disorder
+    for axis, low, high in (
+        zip("xyz", gauge.lower, gauge.upper) if case.tank is not None and not disorder else ()
+    ):
+        low_end, high_end = case.tank.lower["xyz".index(axis)], case.tank.upper["xyz".index(axis)]
+        if high <= low_end or low >= high_end:
+            yield (
+                path,
+                f"'{gauge.name}' lies beside the tank: {axis} from {low:g} to {high:g} m, the tank from {low_end:g} to "
+                f"{high_end:g} m",
+            )
+            return
 
 
 def _gauge_place(case: Case, path: KeyPath, gauge, held: list[Placed]) -> Iterator[Problem]:

@@ -116,7 +116,7 @@ def _pressure(spec, rows_of) -> Gauge:
 
 
 def _patch(spec, rows_of) -> Gauge:
-    points = parallelogram(spec.at, spec.edges) if spec.edges else disc(spec.at, spec.radius, spec.normal)
+    points = patch_points(spec)
     windows = Windows(spec.impulse, spec.mean_over)
     columns = (
         (f"{spec.name}_pressure", "Pa", f"mean pressure over the free part of the patch at {spec.at}"),
@@ -201,6 +201,11 @@ def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge
 
 PATCH_POINTS = 6
 """Points along each edge of a patch, and rings of a disc."""
+
+
+def patch_points(spec) -> Array:
+    """(m, 3) [m] middles of parts of equal area of a patch gauge: a parallelogram (edges), or a disc."""
+    return parallelogram(spec.at, spec.edges) if spec.edges else disc(spec.at, spec.radius, spec.normal)
 
 
 def parallelogram(centre, edges, points: int = PATCH_POINTS) -> Array:

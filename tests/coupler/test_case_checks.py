@@ -244,6 +244,43 @@ def test_gauges_that_measure_nothing(gauge, says):
     assert says in found
 
 
+@pytest.mark.parametrize(
+    ("shape", "says"),
+    [
+        (
+            {"at": [9.9, 5, 1], "edges": [[0.4, 0, 0], [0, 1, 0]]},
+            "out of the tank: no cell is at (10.07, 4.583, 1) m",
+        ),
+        ({"at": [5, 5, 0.1], "radius": 0.2, "normal": [1, 0, 0]}, "'g' reaches out of the tank"),
+    ],
+)
+def test_a_patch_that_reaches_out_of_the_tank_is_refused_before_a_run(shape, says):
+    (found,) = reported(case(gauge=[{"name": "g", "kind": "patch", **shape}]))
+    assert says in found
+
+
+def test_a_patch_in_the_corner_of_the_tank_is_in_it():
+    edges = [[0, 0.3, 0], [0, 0, 0.3]]
+    for at in ([10, 0.15, 0.15], [0, 9.85, 9.85]):
+        assert reported(case(gauge=[{"name": "g", "kind": "patch", "at": at, "edges": edges}])) == []
+
+
+def test_a_box_of_a_volume_gauge_beside_the_tank_is_refused():
+    (found,) = reported(
+        case(gauge=[{"name": "g", "kind": "volume", "lower": [11, 0, 0], "upper": [12, 1, 1]}])
+    )
+    assert "'g' lies beside the tank: x from 11 to 12 m, the tank from 0 to 10 m" in found
+    wide = {"name": "g", "kind": "volume", "lower": [-1, -1, -1], "upper": [12, 11, 11]}
+    assert reported(case(gauge=[wide])) == []
+
+
+def test_a_reaction_needs_a_structure():
+    """What holds a fixed solid is asked of the structure, and a case of water alone has none."""
+    solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
+    (found,) = reported(case(solid=solid, gauge=[{"name": "g", "kind": "reaction", "on": "pier"}]))
+    assert "there is no section [structure]" in found
+
+
 def test_a_gauge_on_the_face_of_a_solid_is_where_it_belongs():
     solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
     assert reported(case(solid=solid, gauge=[{"name": "g", "kind": "pressure", "at": [6, 5, 1]}])) == []
