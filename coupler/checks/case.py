@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from coupler.case.case import Case
+from coupler.case.case import Case, Tank
 from coupler.case.materials import material_remarks
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
@@ -25,6 +25,7 @@ from coupler.checks.softness import softness_remarks
 from coupler.checks.tables import table_problems
 from coupler.checks.unit_slips import unit_remarks
 from coupler.checks.water import water_problems, water_remarks
+from coupler.geometry.bodies import Body
 from coupler.geometry.cell_sizes import has_equal_cells, places_in, widest_cell
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
@@ -123,30 +124,43 @@ def thin_remarks(case: Case) -> Iterator[str]:
 def _widths(case: Case) -> Iterator[tuple[str, float, float, bool]]:
     """Name, smallest width [m] and largest size [m] of the cells across it, of solids, walls and floors as wholes,
     which may have water on one side alone (True), and of all other blocks (False)."""
-    from coupler.geometry.bodies import Body
-
     for _, name, body in solid_bodies(case):
-        yield name, body.thickness(), widest_cell(case.tank, places_in(body), body.thin_way()), True
+        for width, way in _across(case.tank, body):
+            yield name, width, widest_cell(case.tank, places_in(body), way), True
     equal = has_equal_cells(case.tank)
     for part in parts_of(case):
         spec = getattr(case.structure, str(part.path[1]))[part.path[2]]
         if part.path[1] in ("wall", "building"):
             bodies = [] if equal else [Body.of_block(block) for block in part.blocks]
             places = [place for body in bodies for place in (*body.vertices, body.vertices.mean(axis=0))]
-            for width, way in _thin_ways(part.path[1], spec):
+            for width, way in _thin_ways(case.tank, part.path[1], spec):
                 yield part.name, width, widest_cell(case.tank, np.array(places), way), True
         else:
             for body in map(Body.of_block, part.blocks):
                 middle = body.vertices.mean(axis=0, keepdims=True)
-                yield part.name, body.thickness(), widest_cell(case.tank, middle, body.thin_way()), False
+                for width, way in _across(case.tank, body):
+                    yield part.name, width, widest_cell(case.tank, middle, way), False
 
 
-def _thin_ways(kind, spec) -> Iterator[tuple[float, np.ndarray]]:
+def _across(tank: Tank, body: Body) -> Iterator[tuple[float, np.ndarray]]:
+    """The smallest width [m] of a body and the unit direction (3,) of it, if any, among those in which water can be on
+    its two sides: not from side to side of the tank, as across a slice that it fills."""
+    low, high = body.bounds()
+    slack = 1e-6 * np.subtract(tank.upper, tank.lower)
+    spanned = (low <= np.add(tank.lower, slack)) & (high >= np.subtract(tank.upper, slack))
+    ways = body.normals[(np.abs(body.normals)[:, spanned] < 1.0 - 1e-9).all(axis=1)]
+    if len(ways):
+        widths = np.ptp(body.vertices @ ways.T, axis=0)
+        yield float(widths.min()), ways[widths.argmin()]
+
+
+def _thin_ways(tank: Tank, kind, spec) -> Iterator[tuple[float, np.ndarray]]:
     """Widths [m] of a wall, or of the walls and floors of a building, and the unit directions (3,) across them."""
     c, s = np.cos(spec.turn), np.sin(spec.turn)
     ways = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     if kind == "wall":
-        yield min(spec.size), ways[int(np.argmin(spec.size))]
+        centre = np.add(spec.lower, np.multiply(spec.size, 0.5))
+        yield from _across(tank, Body.box(centre, spec.size, ways.T))
     else:
         yield spec.wall_thickness, ways[0]
         yield spec.wall_thickness, ways[1]

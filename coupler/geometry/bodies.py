@@ -55,10 +55,6 @@ class Body:
         """Smallest width across a face [m]."""
         return float(np.ptp(self.vertices @ self.normals.T, axis=0).min())
 
-    def thin_way(self) -> np.ndarray:
-        """Unit direction (3,) in which its width is the smallest."""
-        return self.normals[np.ptp(self.vertices @ self.normals.T, axis=0).argmin()]
-
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Depth (n,) [m] of the points (n, 3) inside the body; negative: outside."""
         middle = self.vertices.mean(axis=0)

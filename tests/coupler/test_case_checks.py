@@ -411,6 +411,22 @@ def test_walls_are_thin_by_the_cells_that_they_stand_in(solid, tank, says):
     assert [text[: len(says)] for text in found] == ([says] if says else [])
 
 
+def test_bodies_that_fill_a_slice_are_not_thin_across_it():
+    """Water is on both sides of a wall along a slice, not across it, where the wall reaches from side to side."""
+    slice_of = {"tank": {"lower": [0, 0, 0], "upper": [40, 1, 8], "cell": 1}}
+    wall = {"name": "w", "size": [3, 1, 6]}
+    bodies = [
+        {"solid": [wall | {"centre": [20, 0.5, 3]}]},
+        structure(wall | {"centre": [20, 0.5, 3]}),
+        structure(wall=[{"name": "w", "lower": [20, 0, 0], "size": [3, 1, 6], "block": [3, 1, 1]}]),
+    ]
+    assert [list(thin_remarks(case(**slice_of, **body))) for body in bodies] == [[], [], []]
+    (found,) = thin_remarks(case(**slice_of, solid=[wall | {"centre": [20, 0.5, 3], "size": [0.8, 1, 6]}]))
+    assert found.startswith("w is 0.8 m thick, thinner than a cell (1 m)")
+    (found,) = thin_remarks(case(**slice_of, solid=[wall | {"centre": [20, 0.4, 3], "size": [3, 0.6, 6]}]))
+    assert found.startswith("w is 0.6 m thick")
+
+
 def test_blocks_walls_and_buildings_are_thin_by_the_cells_that_they_stand_in():
     parts = {
         "block": [{"name": "slab", "centre": [30, 4, 0.25], "size": [2, 2, 0.5]}],
