@@ -1,4 +1,5 @@
-"""Tetrahedra clipped by half spaces: the part in which a linear function is negative, again as tetrahedra.
+"""Tetrahedra clipped by half spaces: the part in which a linear function is negative, again as tetrahedra; their
+sections with planes, as triangles; and triangles clipped in the same way.
 
 Points may carry further linear values behind their coordinates; these are interpolated along with them.
 """
@@ -33,6 +34,40 @@ def clipped(tets, values):
     return np.concatenate(found)
 
 
+def sections(tets, values):
+    """Triangles (k, 3, m) of the tetrahedra (n, 4, m) on which a linear function with corner values (n, 4) is zero.
+
+    A face on which it is zero belongs to the tetrahedron in which it is negative."""
+    inside = values < 0.0
+    found = []
+    for a, b, c, d in CORNERS:
+        others = inside[:, [b, c, d]]
+        at = np.where(inside[:, a], ~others.any(axis=1), others.all(axis=1))
+        found.append(np.stack([_crossing(tets, values, at, a, k) for k in (b, c, d)], axis=1))
+    for a, b, c, d in PAIRS:
+        at = inside[:, a] & inside[:, b] & ~inside[:, c] & ~inside[:, d]
+        ac, ad, bc, bd = (_crossing(tets, values, at, k, o) for k in (a, b) for o in (c, d))
+        found += [np.stack([ac, ad, bc], axis=1), np.stack([ad, bc, bd], axis=1)]
+    return np.concatenate(found)
+
+
+def clipped_triangles(triangles, values):
+    """Triangles (n, 3, m) with corner values (n, 3) → those (k, 3, m) that fill the part where it is negative."""
+    inside = values < 0.0
+    found = [triangles[inside.all(axis=1)]]
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        alone = inside[:, a] & ~inside[:, b] & ~inside[:, c]
+        cut = [_crossing(triangles, values, alone, a, k) for k in (b, c)]
+        found.append(np.stack([triangles[alone, a], *cut], axis=1))
+        without = ~inside[:, a] & inside[:, b] & inside[:, c]
+        ab, ac = (_crossing(triangles, values, without, a, k) for k in (b, c))
+        found += [
+            np.stack([ab, triangles[without, b], triangles[without, c]], axis=1),
+            np.stack([ab, triangles[without, c], ac], axis=1),
+        ]
+    return np.concatenate(found)
+
+
 def volumes(tets):
     """Volumes (n,) [m³] of tetrahedra (n, 4, m ≥ 3), coordinates first."""
     x = tets[:, :, :3]
@@ -40,7 +75,7 @@ def volumes(tets):
 
 
 def _crossing(tets, values, at, a, b):
-    """Point of the edges ab of the tetrahedra `at` (n,) bool where the value is zero."""
+    """Point of the edges ab of the tetrahedra or triangles `at` (n,) bool where the value is zero."""
     t = (values[at, a] / (values[at, a] - values[at, b]))[:, None]
     return (1.0 - t) * tets[at, a] + t * tets[at, b]
 

@@ -7,12 +7,13 @@ import numpy as np
 from array_types import Array
 from fluid.cut.fans import tetrahedra_of
 from fluid.domain.moments import wet_fraction
-from fluid.domain.point_location import Places
-from fluid.readings.clip import clipped, volumes
+from fluid.domain.point_location import NEAR, Places
+from fluid.readings.clip import clipped, clipped_triangles, sections, volumes
 from fluid.readings.solid_spans import Spans, solid_spans
-from fluid.sides.inflow import wet_shares
 
 SAMPLES_PER_CELL = 4
+CORNERS_AND_MIDDLE = ((0.0, 0.0), (-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5))
+"""Shares of its edges that lead from the middle of a parallelogram there and to its corners."""
 HALVINGS = 10
 """Halvings of the distance between two samples to find where the bed begins."""
 
@@ -166,26 +167,37 @@ def flux(water, at, edges) -> float:
     """Water [m³/s] through the parallelogram with the centre `at` (3,) and edges (2, 3) [m], positive along the cross
     product of the edges: ∫_{φ<0} u·n dA.
 
-    φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle whose
-    middle is inside a solid counts as dry. Raises Outside for a parallelogram outside the mesh."""
-    edges = np.asarray(edges, float)
-    m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.finest)) for e in edges)
-    i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")
-    place = np.column_stack([i.ravel() / m - 0.5, j.ravel() / n - 0.5])
-    points = np.asarray(at, float) + place @ edges
-    places = Places.of(water, points, beyond=True)
-    phi = places.read(water.level_set, inside=True)
-    through = places.read(water.velocity, inside=True) @ np.cross(*edges) / (2.0 * m * n)
-    corner = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
-    low, right, up, top = (
-        c.ravel() for c in (corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:])
-    )
-    triangles = np.concatenate([np.column_stack([low, right, top]), np.column_stack([low, top, up])])
-    free = ~Places.of(water, points[triangles].mean(axis=1), beyond=True).inside & np.isfinite(
-        phi[triangles]
-    ).all(axis=1)
-    triangles = triangles[free]
-    return float((wet_shares(phi[triangles]) * through[triangles]).sum())
+    Exact for surface and velocity as the cells have them, and for solids with plane faces: the plane cuts the
+    tetrahedra that fill the fluid parts of the cells. On a face of a solid it is the flux of the water before it.
+    Raises Outside for a parallelogram outside the mesh."""
+    at, edges = np.asarray(at, float), np.asarray(edges, float)
+    normal = np.cross(*edges)
+    Places.of(water, at + np.array(CORNERS_AND_MIDDLE) @ edges, beyond=True)
+    t = water.topology
+    near = NEAR * water.mesh.finest
+    height = (t.nodes - at) @ (normal / np.linalg.norm(normal))
+    wet = t.cells_around(water.level_set < 0.0)
+    crossed = wet[(height[t.cells[wet]] < near).any(axis=1) & (height[t.cells[wet]] > -near).any(axis=1)]
+    hats, nodes = _fluid_parts(t, crossed)
+    shares = (t.nodes - at) @ np.linalg.inv(np.array([*edges, normal]))[:, :2]
+    values = np.column_stack([shares, height, water.level_set, water.velocity @ normal])
+    parts = np.einsum("tqa,tak->tqk", hats, values[nodes])
+    (area, through), (area_behind, behind) = (_through(parts, place) for place in (-near, near))
+    return behind if area_behind > (1.0 + 1e-6) * area else through
+
+
+def _through(parts, place: float) -> tuple[float, float]:
+    """Wet share of a parallelogram that is moved by `place` [m] along its normal, and ∫ u·n dA over it [m³/s]; parts
+    (n, 4, 5): corners of tetrahedra, by the shares of its edges that lead there from its middle and the height [m] over
+    it, with φ [m] and the product of u·n and its area [m³/s]."""
+    flat = sections(parts, parts[:, :, 2] - place)
+    for edge in (0, 1):
+        flat = clipped_triangles(flat, -0.5 - flat[:, :, edge])
+        flat = clipped_triangles(flat, flat[:, :, edge] - 0.5)
+    flat = clipped_triangles(flat, flat[:, :, 3])
+    one, other = flat[:, 1, :2] - flat[:, 0, :2], flat[:, 2, :2] - flat[:, 0, :2]
+    share = 0.5 * np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
+    return float(share.sum()), float(share @ flat[:, :, 4].mean(axis=1))
 
 
 def volume_in_box(water, lower, upper) -> float:
@@ -209,10 +221,19 @@ def volume_in_box(water, lower, upper) -> float:
 def _fans(water, cut) -> tuple[Array, Array]:
     """Corners (T, 4, 3) [m] of the tetrahedra that fill the fluid parts of cut cells (n,), and φ (T, 4) there."""
     t = water.topology
-    which, number = tetrahedra_of(t.parts.start, cut)
-    hats, nodes = t.parts.corners[number], t.cells[cut[which]]
+    hats, nodes = _fluid_parts(t, cut)
     phi = np.einsum("tqa,ta->tq", hats, water.level_set[nodes])
     return np.einsum("tqa,tak->tqk", hats, t.nodes[nodes]), phi
+
+
+def _fluid_parts(t, cells) -> tuple[Array, Array]:
+    """Tetrahedra that fill the fluid parts of cells (n,) of a topology: hat functions (T, 4, 4) of the nodes (T, 4) of
+    their cells at their corners; a cell that nothing cuts is one of its own."""
+    is_cut = t.parts.start[cells] < t.parts.start[cells + 1]
+    which, number = tetrahedra_of(t.parts.start, cells[is_cut])
+    whole = t.cells[cells[~is_cut]]
+    hats = np.concatenate([np.broadcast_to(np.eye(4), (len(whole), 4, 4)), t.parts.corners[number]])
+    return hats, np.concatenate([whole, t.cells[cells[is_cut][which]]])
 
 
 def _in_box(tets, phi, lower, upper):

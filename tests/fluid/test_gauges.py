@@ -215,6 +215,37 @@ def test_flux_through_a_slanted_plane_counts_its_projection():
     assert slanted == pytest.approx(0.4 * 0.5, rel=1e-12)
 
 
+@pytest.mark.parametrize("top", [0.1875, 0.2, 0.25, 0.27])
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_flux_over_a_sill_begins_at_its_top(top, covers):
+    """Wherever the top lies in the cells, and whether the patch ends above it, at it or within the sill."""
+    sill = ConvexBodies.boxes(np.array([[0.5, 0.5, 0.5 * top]]), np.array([[0.3, 2.0, top]]))
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.437, sill, covers=covers)
+    water.velocity[:] = [1.5, 0.0, 0.0]
+    for low in (0.0, 0.11, top, 0.3):
+        across = gauges.flux(water, [0.47, 0.5, 0.5 * (low + 1.0)], [[0, 1, 0], [0, 0, 1.0 - low]])
+        assert across == pytest.approx(1.5 * (0.437 - max(low, top)), rel=1e-6)
+
+
+def test_flux_over_a_sloping_bed_begins_at_it():
+    """The patch may reach below the bed, which lies between any two points at which one could look."""
+    from coupler.step.immersion import Immersion
+    from fluid.mesh.fitted_mesh import fitted_mesh
+    from fluid.step.parameters import WaterParameters
+    from fluid.step.water import Water
+
+    mesh = fitted_mesh((0, 0, -1), (4, 2, 1), 0.5, lambda x, y: 0.37 * x - 0.93).mesh
+    water = Water(
+        mesh, Immersion(mesh, None, [], "single").domain, lambda x: x[:, 2] - 0.31, WaterParameters()
+    )
+    water.velocity[:] = [2.0, 0.0, 0.0]
+    for x in np.random.default_rng(1).uniform(0.1, 2.5, 10):
+        across = gauges.flux(water, [x, 0.9, 0.0], [[0, 1.3, 0], [0, 0, 1.9]])
+        assert across == pytest.approx(2.0 * 1.3 * (0.31 - (0.37 * x - 0.93)), rel=1e-6)
+    with pytest.raises(Outside):
+        gauges.flux(water, [9.0, 0.9, 0.0], [[0, 1.3, 0], [0, 0, 1.9]])
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.floats(0.0, 0.97), min_size=3, max_size=3), st.floats(0.02, 0.6), st.floats(0.1, 0.9))
 def test_volume_in_any_box_under_a_flat_surface(lower, edge, level):
