@@ -22,7 +22,7 @@ from coupler.run.fingerprint import differences, file_digests, program, scene_pa
 
 FOLDER = "checkpoints"
 KEPT = 2
-LAYOUT = 7
+LAYOUT = 8
 """Number of the names, kinds and columns of the arrays; checkpoints of another one are refused."""
 UNSET = (
     "structure/joints/failure_time",

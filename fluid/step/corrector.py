@@ -102,7 +102,7 @@ def corrected(water, problem, x, parting) -> Corrected:
     slipping = copied_at(held, u)
     listed, start = water.layers(kept.wet)
     _continue(water, kept, listed, start, u, a, forced, calm)
-    cell_field, flux = _flux(water, kept, listed, start, u, gradient)
+    cell_field, flux = _flux(water, kept, listed, start, u, gradient, dt)
     momentum = momentum_change(
         water,
         problem,
@@ -274,9 +274,9 @@ def _keep_momentum(first, last, share, wet, water, capacity, forced, u):
                 u[i, k] += weight * (forced[i, k] - u[i, k])
 
 
-def _flux(water, kept, listed, start, u, gradient):
-    """Velocity of the cells, CellVectors, and the volume flux of the next step, extrapolated to its middle; gradient:
-    (dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
+def _flux(water, kept, listed, start, u, gradient, dt):
+    """Velocity of the cells, CellVectors, and the volume flux of the next step, extrapolated to the middle of one as
+    long as this, dt [s]; gradient: (dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
     t = water.topology
     reached = listed[: start[FLUX_LAYERS + 1]]
     near = np.zeros(len(u), bool)
@@ -298,8 +298,9 @@ def _flux(water, kept, listed, start, u, gradient):
         now,
         middle,
     )
-    held = less(kept.nodal_water, kept.displaced)
-    return CellVectors(around, now), edge_flux(t, water.graph_for(reached), reached, middle, held)
+    held, field = less(kept.nodal_water, kept.displaced), CellVectors(around, now)
+    length = dt if water.parameters.theta < 1.0 else 0.0
+    return field, edge_flux(t, water.graph_for(reached), reached, middle, held, field, length)
 
 
 @ranged

@@ -81,6 +81,7 @@ def save(water) -> dict[str, Array]:
     }
     arrays["cells"] = np.array(len(water.topology.cells))
     arrays["flux_velocity"] = water.flux.velocity[water.cell_velocity.cells]
+    arrays["flux_dt"] = np.array(water.flux.dt)
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
         arrays["absorbed"] = water.sides.absorbed
@@ -119,6 +120,8 @@ def restore(water, domain, arrays) -> None:
         water=water.nodal_water - water.displaced,
         capacity=water.topology.node_volume,
         room=water.topology.room,
+        now=water.cell_velocity,
+        dt=float(arrays["flux_dt"]),
     )
     if water.sides is not None:
         for name in SIDES:
@@ -147,6 +150,7 @@ def _check(domain, arrays, sides, air) -> None:
         "flux_nodes",
         "flux",
         "flux_velocity",
+        "flux_dt",
     }
     wanted |= {*SIDES, "absorbed"} if sides is not None else set()
     wanted |= {f"air_{name}" for name in OF_AIR} if air is not None else set()

@@ -459,8 +459,8 @@ class Water:
         return replace(carried, water=carried.water + self.slits.carried(dt))
 
     def _carried(self, dt: float, theta: float, kick) -> Carried:
-        p, flux = self.parameters, self.flux
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
+        p, flux = self.parameters, self.flux.half_ahead(t, dt)
         if self.left_behind is not None:
             kick = self._kick_factor(a, t.node_size, self.fastest())
         u_hat, u_m = kicked(u, a, kick, dt, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
