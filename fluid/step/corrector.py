@@ -33,7 +33,7 @@ from fluid.step.remainders import MEMORY_DEPTH, left_in_cells
 from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
-from fluid.surface.volume import Flux, edge_flux
+from fluid.surface.volume import FluxAhead
 from kernels.decorators import ranged
 from kernels.threads import CHUNK, over, summed, zeros
 
@@ -69,7 +69,7 @@ class Corrected:
     kick_remainder: CellVectors
     cell_velocity: CellVectors
     nodal_water: Floats
-    flux: Flux
+    flux: FluxAhead
     listed: Ints
     layer_start: Ints
     at_bound: Bools
@@ -275,17 +275,14 @@ def _keep_momentum(first, last, share, wet, water, capacity, forced, u):
 
 
 def _flux(water, kept, listed, start, u, gradient, dt):
-    """Velocity of the cells, CellVectors, and the volume flux of the next step, extrapolated to the middle of one as
-    long as this, dt [s]; gradient: (dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
+    """Velocity of the cells, CellVectors, and what the flux of the next step is made of; gradient: (dt/ρ) ∇x (n, 3)
+    [m/s] of the wet cells, dt [s] of this step."""
     t = water.topology
     reached = listed[: start[FLUX_LAYERS + 1]]
     near = np.zeros(len(u), bool)
     near[reached] = True
     around = t.cells_around(near)
-    now, middle = np.empty((len(around), 3)), np.empty((len(t.cells), 3))
-    last = water.cell_velocity
-    # with implicit Euler the velocity at the end of the step is the stable choice
-    before = last if water.parameters.theta < 1.0 else CellVectors.none()
+    now, before = np.empty((len(around), 3)), np.empty((len(around), 3))
     wet = (kept.wet_cells, kept.cell_star, gradient)
     over(
         _cells_of_flux,
@@ -293,24 +290,34 @@ def _flux(water, kept, listed, start, u, gradient, dt):
         around,
         u,
         wet,
-        tuple(before),
+        tuple(water.cell_velocity),
         t.fluid_cells,
         now,
-        middle,
+        before,
     )
-    held, field = less(kept.nodal_water, kept.displaced), CellVectors(around, now)
-    length = dt if water.parameters.theta < 1.0 else 0.0
-    return field, edge_flux(t, water.graph_for(reached), reached, middle, held, field, length)
+    field = CellVectors(around, now)
+    ahead = FluxAhead(
+        nodes=reached,
+        graph=water.graph_for(reached),
+        now=field,
+        before=before,
+        # with implicit Euler the velocity at the end of the step is the stable choice
+        dt=dt if water.parameters.theta < 1.0 else 0.0,
+        water=less(kept.nodal_water, kept.displaced),
+        capacity=t.node_volume,
+        room=t.room,
+    )
+    return field, ahead
 
 
 @ranged
-def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
+def _cells_of_flux(first, last, cell_list, u, wet, known, fluid, now, before):
     """Velocity (n, 3) of the listed cells: that of the projection in wet ones, elsewhere u (N, 3) at the centroid; and
-    (M, 3) half a step ahead, 1.5 u - 0.5 u_before, u where none was before. Other cells are not written to.
+    (n, 3) at the beginning of the step, the same where there was none.
 
-    wet: cells (k,), their u* (k, 3) and what the pressure takes from it (k, 3) · before: cells (l,) and their values
-    (l, 3) then. All lists ascend."""
-    (wet_cells, star, taken), (cells_before, u_before) = wet, before
+    wet: cells (k,), their u* (k, 3) and what the pressure takes from it (k, 3) · known: cells (l,) and their values
+    (l, 3) at the beginning. All lists ascend."""
+    (wet_cells, star, taken), (cells_before, u_before) = wet, known
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     begin = cell_list[first] if first < last else 0
     w, w_end = first_from(wet_cells, begin), np.uint64(wet_cells.shape[0])
@@ -330,10 +337,10 @@ def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
                 now[s, k] = 0.0
                 for a in range(4):
                     now[s, k] += share[row, a] * u[cells[e, a], k]
-        known = b < b_end and cells_before[b] == cell_list[s]
-        known = known and (u_before[b, 0] != 0.0 or u_before[b, 1] != 0.0 or u_before[b, 2] != 0.0)
+        moved = b < b_end and cells_before[b] == cell_list[s]
+        moved = moved and (u_before[b, 0] != 0.0 or u_before[b, 1] != 0.0 or u_before[b, 2] != 0.0)
         for k in range(3):
-            middle[e, k] = 1.5 * now[s, k] - 0.5 * u_before[b, k] if known else now[s, k]
+            before[s, k] = u_before[b, k] if moved else now[s, k]
 
 
 def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):

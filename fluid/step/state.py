@@ -13,7 +13,7 @@ import numpy as np
 from array_types import Array
 from fluid.domain.cell_vectors import CellVectors
 from fluid.domain.topology import Graph
-from fluid.surface.volume import Flux
+from fluid.surface.volume import FluxAhead
 
 NODAL = (
     "level_set",
@@ -67,7 +67,8 @@ class OtherWater(ValueError):
 def save(water) -> dict[str, Array]:
     """Everything of a Water that changes in time, by name: references, since a step replaces the arrays that it
     changes.  Raises NotAfterAStep."""
-    if water.flux.capacity is not water.topology.node_volume:
+    flux = water.flux
+    if flux.capacity is not water.topology.node_volume or flux.now is not water.cell_velocity:
         raise NotAfterAStep("the state of the water can be saved after a step, before the solids move on")
     arrays = {name: np.asarray(getattr(water, name)) for name in (*NODAL, *OF_BODIES, *NUMBERS)}
     for name in OF_CELLS:
@@ -75,13 +76,12 @@ def save(water) -> dict[str, Array]:
         arrays |= {f"{name}_cells": listed.cells, name: listed.values}
     arrays |= {"listed": water.listed, "layer_start": water.layer_start}
     arrays |= {
-        "graph_nodes": water.flux.graph.nodes,
-        "flux_nodes": water.flux.nodes,
-        "flux": rate_of_listed(water.flux),
+        "graph_nodes": flux.graph.nodes,
+        "flux_nodes": flux.nodes,
+        "flux_before": flux.before,
+        "flux_dt": np.array(flux.dt),
     }
     arrays["cells"] = np.array(len(water.topology.cells))
-    arrays["flux_velocity"] = water.flux.velocity[water.cell_velocity.cells]
-    arrays["flux_dt"] = np.array(water.flux.dt)
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
         arrays["absorbed"] = water.sides.absorbed
@@ -92,13 +92,6 @@ def save(water) -> dict[str, Array]:
     return arrays
 
 
-def rate_of_listed(flux) -> Array:
-    """Rates (edges,) [m³/s] of the flux, zero along edges out of nodes that it does not list."""
-    g, listed = flux.graph, np.zeros(len(flux.graph.nodes), bool)
-    listed[g.row[flux.nodes]] = True
-    return np.where(np.repeat(listed, np.diff(g.start)), flux.rate, 0.0)
-
-
 def restore(water, domain, arrays) -> None:
     """Back to a saved state on `domain`, the same as the one that it was saved on.  Raises OtherWater."""
     _check(domain, arrays, water.sides, water.air)
@@ -107,21 +100,19 @@ def restore(water, domain, arrays) -> None:
         setattr(water, name, np.array(arrays[name]))
     for name in OF_CELLS:
         setattr(water, name, CellVectors(np.array(arrays[f"{name}_cells"]), np.array(arrays[name])))
-    of_flux = CellVectors(water.cell_velocity.cells, np.array(arrays["flux_velocity"]))
     for name, kind in NUMBERS.items():
         setattr(water, name, kind(arrays[name]))
     water.graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
     water.renumbered, water.left_behind, water.report = None, None, None
-    water.flux = Flux(
+    water.flux = FluxAhead(
         nodes=np.array(arrays["flux_nodes"]),
         graph=water.graph,
-        rate=np.array(arrays["flux"]),
-        velocity=of_flux.field(len(water.topology.cells)),
+        now=water.cell_velocity,
+        before=np.array(arrays["flux_before"]),
+        dt=float(arrays["flux_dt"]),
         water=water.nodal_water - water.displaced,
         capacity=water.topology.node_volume,
         room=water.topology.room,
-        now=water.cell_velocity,
-        dt=float(arrays["flux_dt"]),
     )
     if water.sides is not None:
         for name in SIDES:
@@ -148,8 +139,7 @@ def _check(domain, arrays, sides, air) -> None:
         "layer_start",
         "graph_nodes",
         "flux_nodes",
-        "flux",
-        "flux_velocity",
+        "flux_before",
         "flux_dt",
     }
     wanted |= {*SIDES, "absorbed"} if sides is not None else set()

@@ -36,7 +36,7 @@ from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gat
 from fluid.surface.cavities import on_one_side
 from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
-from fluid.surface.volume import edge_flux, nodal_volume, renumbering
+from fluid.surface.volume import FluxAhead, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
 from kernels.decorators import ranged
@@ -180,9 +180,22 @@ class Water:
                 return
 
     def _flux_at_start(self):
-        """The fluxes of the velocity of the cells at the start."""
-        of_cells = self.cell_velocity.field(len(self.topology.cells))
-        return edge_flux(self.topology, self.graph_for(self.listed), self.listed, of_cells, self.nodal_water)
+        """The fluxes of the velocity of the cells at the start, which is that of all cells around the listed nodes."""
+        t, near = self.topology, np.zeros(len(self.velocity), bool)
+        near[self.listed] = True
+        around = t.cells_around(near)
+        now = CellVectors(around, self.cell_velocity.field(len(t.cells))[around])
+        self.cell_velocity = now
+        return FluxAhead(
+            nodes=self.listed,
+            graph=self.graph_for(self.listed),
+            now=now,
+            before=now.values,
+            dt=0.0,
+            water=self.nodal_water,
+            capacity=t.node_volume,
+            room=t.room,
+        )
 
     def _start_moving(self, velocity) -> None:
         """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
@@ -460,7 +473,7 @@ class Water:
 
     def _carried(self, dt: float, theta: float, kick) -> Carried:
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
-        p, flux = self.parameters, self.flux.half_ahead(t, dt)
+        p, flux = self.parameters, self.flux.over(t, dt)
         if self.left_behind is not None:
             kick = self._kick_factor(a, t.node_size, self.fastest())
         u_hat, u_m = kicked(u, a, kick, dt, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)

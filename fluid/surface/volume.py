@@ -33,7 +33,7 @@ discharge only 0.82 went through the middle of the basin (now 0.99).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -71,9 +71,7 @@ relative tolerance."""
 class Flux:
     """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`;
     velocity (M, 3) [m/s] of the cells that it comes from; water (N,) and capacity (N,) [m³]: what every node holds and
-    could hold on the same domain; room (N,) [m³]: `Topology.room` of it; now: velocity of the cells when the step ended
-    whose length [s] is dt and half of which velocity and rate lie ahead of it, none and 0 where they lie ahead of
-    nothing."""
+    could hold on the same domain; room (N,) [m³]: `Topology.room` of it."""
 
     nodes: Ints
     graph: Graph
@@ -82,20 +80,44 @@ class Flux:
     water: Floats
     capacity: Floats
     room: Floats
-    now: CellVectors
-    dt: float
 
-    def half_ahead(self, topology, dt: float) -> Flux:
-        """The flux half of a step of dt [s] ahead, on the topology that it was made on. The change of the velocity of
-        the last step goes on at its rate, but within a step for no longer than AHEAD steps like the last one: the rest
-        of a step that was cut short by an impact would go on with its acceleration."""
-        share = min(dt / self.dt, AHEAD) if self.dt > 0.0 else 1.0
-        if abs(share - 1.0) < SAME_STEP:
-            return self
-        velocity, (cells, now) = self.velocity.copy(), self.now
-        velocity[cells] = now + share * (velocity[cells] - now)
-        rate = edge_rates(topology, self.graph, self.nodes, velocity)
-        return replace(self, rate=rate, velocity=velocity, dt=0.0)
+
+@dataclass(frozen=True, kw_only=True)
+class FluxAhead:
+    """What the flux of a step is made of once its length is known: the listed nodes (n,) with their graph; now:
+    velocity of the cells around them when the last step ended, before (k, 3) [m/s]: at its beginning, or now where no
+    velocity was; dt [s]: its length, 0 where the flux lies ahead of nothing; water, capacity and room of `Flux`."""
+
+    nodes: Ints
+    graph: Graph
+    now: CellVectors
+    before: Floats
+    dt: float
+    water: Floats
+    capacity: Floats
+    room: Floats
+
+    def over(self, topology, dt: float) -> Flux:
+        """The flux half of a step of dt [s] ahead, on the topology that the velocity belongs to. Its change in the last
+        step goes on at its rate, but within a step for no longer than AHEAD steps like the last one: the rest of a step
+        that was cut short by an impact would go on with its acceleration."""
+        share = min(dt / self.dt, AHEAD) if self.dt > 0.0 else 0.0
+        share = 1.0 if abs(share - 1.0) < SAME_STEP else share
+        velocity = np.empty((len(topology.cells), 3))
+        over(_half_ahead, len(self.now.cells), self.now.cells, self.now.values, self.before, share, velocity)
+        return edge_flux(topology, self.graph, self.nodes, velocity, self.water)
+
+
+@ranged
+def _half_ahead(first, last, cells, now, before, share, out):
+    """u + ½ share (u - u_before) (M, 3) [m/s] of the listed cells (n,); other cells are not written to."""
+    for s in range(first, last):
+        e = cells[s]
+        for k in range(3):
+            if before[s, k] == now[s, k]:
+                out[e, k] = now[s, k]
+            else:
+                out[e, k] = (1.0 + 0.5 * share) * now[s, k] - 0.5 * share * before[s, k]
 
 
 @released
@@ -136,20 +158,17 @@ def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, products, arou
                     )
 
 
-def edge_flux(topology, graph, listed, u_cell, water, now=None, dt: float = 0.0) -> Flux:
+def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells,
-    water (N,) [m³] volume at the nodes; now, dt: of `Flux`, None: u_cell lies ahead of nothing."""
-    rate = edge_rates(topology, graph, listed, u_cell)
+    water (N,) [m³] volume at the nodes."""
     return Flux(
         nodes=listed,
         graph=graph,
-        rate=rate,
+        rate=edge_rates(topology, graph, listed, u_cell),
         velocity=u_cell,
         water=water,
         capacity=topology.node_volume,
         room=topology.room,
-        now=CellVectors.none() if now is None else now,
-        dt=dt,
     )
 
 

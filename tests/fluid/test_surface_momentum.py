@@ -17,7 +17,7 @@ def test_velocity_carried_with_the_volume_keeps_momentum_and_range():
     before = water.velocity.copy()
     before[:, 0] += np.sin(9.0 * water.topology.nodes[:, 0])
     u = before.copy()
-    volume, _ = carry_volume(water.flux, water.stable_step(), u)
+    volume, _ = carry_volume(water.flux.over(water.topology, water.stable_step()), water.stable_step(), u)
     assert volume @ u == pytest.approx(water.nodal_water @ before, rel=1e-10, abs=1e-12)
     wet = volume > 0.0
     assert np.all(u[wet] <= before.max(axis=0) + 1e-12)
