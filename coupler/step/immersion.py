@@ -26,15 +26,16 @@ FILM = 1e-4
 sealed or open must follow from the joints, not from the micrometres of a contact (a sealed face takes the
 buoyancy away). Faces that overlap others are drawn in by the overlap as well, in doubling steps."""
 MOST_FILM = 0.05
-"""Largest inward shift of a face as a fraction of a cell edge; in a harder impact the face is sealed for a moment."""
+"""Largest inward shift of a face as a fraction of the edge of the cells around the block; in a harder impact the face
+is sealed for a moment."""
 FACES_IT = 0.5
 """Least n·e of a face of a block that counts as the one which the contact along e is on."""
 SPANS = 0.02
-"""Share of a cell edge within which a block that reaches two opposite sides of the tank closes it: a slice of a long
-body. A film of micrometres there would be water of no volume, with any velocity. The same holds for a block that
-joints hold with a face at an upright side, where it fits the tank from the start: the end of a wall across a flume. The
-weight moves it by micrometres, and the water in this slit began with a surface at the face of the wall, where its
-pressure was zero: two thirds of the thrust of still water in the first step, 1.3 times in the second."""
+"""Share of the edge of the cells around it within which a block that reaches two opposite sides of the tank closes it:
+a slice of a long body. A film of micrometres there would be water of no volume, with any velocity. The same holds for
+a block that joints hold with a face at an upright side, where it fits the tank from the start: the end of a wall across
+a flume. The weight moves it by micrometres, and the water in this slit began with a surface at the face of the wall,
+where its pressure was zero: two thirds of the thrust of still water in the first step, 1.3 times in the second."""
 FLUSH = 1e-6
 """Share of a cell edge within which a face lies in a side of the tank at the start."""
 ALONG = 1e-3
@@ -76,7 +77,7 @@ class Immersion:
         self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
         low, high = mesh.bounds
         self._long = np.flatnonzero(
-            2.0 * self._radius[: self.n_blocks] > (high - low)[:2].min() - mesh.finest
+            2.0 * self._radius[: self.n_blocks] > (high - low)[:2].min() - mesh.local_size.max()
         )
         """Blocks that are long enough to reach from one side of the tank to the opposite one."""
         self._in_side = self._faces_in_sides()
@@ -85,14 +86,27 @@ class Immersion:
         self._first_pose = self._centre.copy(), self._rotation.copy()
         none = np.zeros(0, np.int64), np.zeros((0, 3))
         self._flush = none if structure is None else structure.touching_at_start()
-        self._growth = self._new_growth(np.full(len(self._body_of_plane), -np.inf))
+        self._sizes = np.full(self.n_blocks, mesh.finest)
+        """Those of `cell_sizes`; the least of the mesh before the first cut."""
+        unset = np.full(len(self._body_of_plane), -np.inf)
+        self._growth = self._new_growth(unset)
         self.bodies = self._placed()
         self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
+        self._sizes = self._sizes_of_cells()
+        growth = self._new_growth(unset)
+        if (growth != self._growth).any():  # by cells that are larger around a body than elsewhere
+            self._growth = growth
+            self.bodies = self._placed()
+            self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
         self.cut_again = 0
         """Bodies whose cells the last update cut again."""
 
     def cell_sizes(self) -> Array:
         """Least size [m] of the cells that each block meets (n,); that of the whole mesh for those that meet none."""
+        return self._sizes
+
+    def _sizes_of_cells(self) -> Array:
+        """`cell_sizes` of the present domain."""
         memory = self.domain.memory
         size = np.full(len(self.bodies), np.inf)
         np.minimum.at(size, memory.pair_body, self.mesh.local_size[memory.pair_cell])
@@ -116,6 +130,7 @@ class Immersion:
         self._growth = growth
         self.bodies = self._placed()
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, self.domain, connection=self.connection)
+        self._sizes = self._sizes_of_cells()
         return True
 
     def sealed_domain(self) -> PhysicalDomain:
@@ -165,6 +180,7 @@ class Immersion:
         self._first_pose = saved["first_centre"].copy(), saved["first_rotation"].copy()
         self.bodies = self._placed()
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, connection=self.connection)
+        self._sizes = self._sizes_of_cells()
         self.cut_again = 0
 
     def _pose(self) -> tuple[Array, Array]:
@@ -207,7 +223,8 @@ class Immersion:
         growth[rows] = -np.inf
         np.maximum.at(growth, rows, (1.0 + steps / STEPS - overlap) * self._tolerance)
         growth[rows] = np.maximum(growth[rows], before[rows])
-        growth[self._closing_planes(loose)] = 2.0 * SPANS * self.mesh.finest
+        closing = self._closing_planes(loose)
+        growth[closing] = 2.0 * SPANS * self._sizes[self._body_of_plane[closing]]
         return growth
 
     def _closed_faces(self) -> tuple[Array, Array, Array]:
@@ -232,20 +249,20 @@ class Immersion:
         touching[block] = True
         touching[joined[loose[joined]]] = True
         film[touching[self._body_of_plane]] = least
-        np.maximum.at(film, start[joined] + joined_plane, self._doubled(closing))
+        np.maximum.at(film, start[joined] + joined_plane, self._doubled(closing, joined))
         count = np.diff(start)[block]
         contact = np.repeat(np.arange(len(block)), count)
         plane = np.arange(len(contact)) - np.repeat(np.cumsum(count) - count, count) + start[block][contact]
         local = np.einsum("kij,ki->kj", self.structure.rotation()[block], direction)
         on = np.einsum("ki,ki->k", self._reference.normals[plane], local[contact]) > FACES_IT
-        np.maximum.at(film, plane[on], self._doubled(depth)[contact[on]])
+        np.maximum.at(film, plane[on], self._doubled(depth, block)[contact[on]])
         return film
 
-    def _doubled(self, depth: Array) -> Array:
-        """Film (k,) [m] for an overlap of `depth` (k,) [m], in doubling steps."""
+    def _doubled(self, depth: Array, block: Array) -> Array:
+        """Film (k,) [m] for an overlap of `depth` (k,) [m] of a block (k,), in doubling steps."""
         least = FILM * self.mesh.finest
         doubled = least * 2.0 ** np.ceil(np.log2(1.0 + np.maximum(depth, 0.0) / least))
-        return np.minimum(doubled, MOST_FILM * self.mesh.finest)
+        return np.minimum(doubled, MOST_FILM * self._sizes[block])
 
     def _touching(self) -> tuple[Array, Array, Array]:
         """Contacts as `Structure.overlaps`, and faces that touched at the start, at depth 0, of blocks that still stand
@@ -299,17 +316,17 @@ class Immersion:
         if len(self._long) == 0 and len(rows) == 0:
             return closing
         low, high = self.mesh.bounds
-        margin = SPANS * self.mesh.finest
+        margin = SPANS * self._sizes
         centre, rotation = self.structure.centre(), self.structure.rotation()
         normals = np.einsum("pij,pj->pi", self._turns(rotation), self._reference.normals)
         body, sign = self._body_of_plane[rows], 2 * ends - 1
         at = centre[body, axes] + sign * self._reference.offsets[rows]
-        there = np.abs(at - self.mesh.bounds[ends, axes]) < margin
+        there = np.abs(at - self.mesh.bounds[ends, axes]) < margin[body]
         there &= sign * normals[rows, axes] > 1.0 - ALONG
         closing[rows] = there & ~loose[body]
         for b in self._long:
             corners = centre[b] + self.structure.shape_vertices[b] @ rotation[b].T
-            spans = (corners.min(axis=0) < low + margin) & (corners.max(axis=0) > high - margin)
+            spans = (corners.min(axis=0) < low + margin[b]) & (corners.max(axis=0) > high - margin[b])
             spans[2] = False  # water gets under a block as high as the tank
             if spans.any():
                 own = self._body_of_plane == b

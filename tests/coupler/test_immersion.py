@@ -98,3 +98,34 @@ def test_a_block_that_has_left_its_place_has_no_film_there_before_and_after_a_re
         s.restore(moved)
         resumed.restore(saved)
         assert not resumed.update()
+
+
+FINE = np.array([*np.arange(0.0, 1.01, CELL), 1.05, 1.1])
+"""Axis whose cells are a fifth as long at its upper end."""
+
+
+def growths(axes, block, contact, moved=(0.0, 0.0, 0.0)):
+    """Shift of the faces of a block on the ground, -x +x -y +y -z +z [m], after it has moved."""
+    with Structure([block], contact, None, ground=0.0, gravity=(0, 0, 0)) as s:
+        immersion = Immersion(box_mesh(None, None, axes=axes), s, [], "single")
+        s.displace(np.array([0]), np.array([moved]), np.eye(3)[None])
+        immersion.update()
+        return immersion.bodies.growth
+
+
+@pytest.mark.parametrize("top", [np.arange(0.0, 1.01, CELL), FINE])
+def test_films_go_by_the_cells_around_the_block(top):
+    """A block that has sunk into the ground by 0.04 of its cells is open to water below, however fine the cells are
+    above it: closed, it lost its buoyancy."""
+    even, depth = np.arange(0.0, 2.01, CELL), 0.04 * CELL
+    block = Block("b", (1.0, 1.0, 0.25), size=0.5)
+    below = growths((even, even, top), block, ContactLaw(1e6), moved=(0.0, 0.0, -depth))[4]
+    assert below <= -depth
+
+
+@pytest.mark.parametrize("top", [np.arange(0.0, 1.01, CELL), FINE])
+def test_a_slice_closes_the_tank_by_the_cells_around_it(top):
+    gap = 0.016 * CELL
+    block = Block("slice", (1.0, 0.5, 0.25), size=(0.5, 1.0 - 2.0 * gap, 0.5))
+    axes = np.arange(0.0, 2.01, CELL), np.arange(0.0, 1.01, CELL), top
+    assert (growths(axes, block, ContactLaw(1e6))[2:4] > gap).all()
