@@ -19,8 +19,13 @@ def export(
     to: Annotated[
         Path | None, typer.Option(metavar="DIR", help="directory for the files; default: RUN/export")
     ] = None,
-    begin: Annotated[float, typer.Option("--from", metavar="S", help="first time [s]")] = 0.0,
-    end: Annotated[float, typer.Option("--until", metavar="S", help="last time [s]")] = float("inf"),
+    begin: Annotated[
+        float,
+        typer.Option("--from", metavar="S", help="time [s] of the first state; histories and maps are whole"),
+    ] = 0.0,
+    end: Annotated[float, typer.Option("--until", metavar="S", help="time [s] of the last state")] = float(
+        "inf"
+    ),
 ) -> None:
     """Write results for other programs.
 
