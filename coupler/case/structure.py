@@ -293,7 +293,9 @@ class BlockFile(Section):
     """Blocks from a mesh: each cell (tetrahedron, pyramid, wedge, hexahedron) or each closed convex surface is one."""
 
     name: Name = Field(
-        "file", description="the group of its blocks, NAME-0 and so on in the order of the file"
+        "file",
+        description="the group of its blocks, NAME-0 and so on in the order of the file; of several kinds of volume "
+        "cells, or of surfaces of triangles beside those of quads, one kind after another",
     )
     path: Annotated[str, Field(min_length=1)] = Field(
         description="any format that meshio reads (STL, OBJ, PLY, MSH, VTK, VTU, ...), from the directory of the case",

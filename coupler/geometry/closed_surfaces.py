@@ -37,13 +37,20 @@ class Surface:
 def closed_surfaces(points: Array, loops: list[Array]) -> list[Surface]:
     """The closed surfaces that the polygons make, in the order of their first polygon.
 
-    points (n, 3) [m], welded · loops: rows of points. Raises SurfaceError where an edge belongs to one polygon only.
+    points (n, 3) [m], welded · loops: rows of points. Raises SurfaceError where an edge belongs to one polygon only,
+    and where welding has left nothing of a body.
     """
     unique, rows = np.unique(points, axis=0, return_inverse=True)
-    loops = [_without_repeats(rows.ravel()[loop]) for loop in loops]
+    drawn = [rows.ravel()[loop] for loop in loops]
+    loops = [_without_repeats(loop) for loop in drawn]
     loops = [loop for loop in loops if len(set(loop.tolist())) >= 3]
     if not loops:
         raise SurfaceError("no polygon has an area")
+    lost = np.setdiff1d(np.concatenate(drawn), np.concatenate(loops))
+    if len(lost):
+        raise SurfaceError(
+            f"the body at {shown(unique[lost[0]])} is so small that its corners became one; leave it out or weld less"
+        )
     if _volume(unique, loops) < 0.0:  # all seen from inside
         loops = [loop[::-1] for loop in loops]
     middles = np.array([unique[loop].mean(axis=0) for loop in loops])

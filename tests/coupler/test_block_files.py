@@ -99,6 +99,15 @@ def test_a_random_mesh_of_tetrahedra_is_joined_all_over(tmp_path_factory, seed):
     assert len(touching_faces(blocks)) == len(keys) - len(set(keys))
 
 
+@pytest.mark.parametrize("small", [(0.02, 0.02, 0.02), (0.02, 0.02, 1.0)])
+def test_a_body_that_welding_leaves_nothing_of_is_refused(tmp_path, small):
+    """A dowel or a rod thinner than `weld` was left out without a word, beside blocks that were read."""
+    points, cells = joined([brick((0, 0, 0)), brick((3, 0, 0), small)], TRIANGLES)
+    path = write(tmp_path, "b.obj", points, triangle=cells)
+    assert len(read(path)) == 2
+    assert "the body at (3.01, 0.01, " in refused(path, weld=0.05)
+
+
 def test_single_precision_leaves_plane_faces_and_joints(tmp_path):
     """A wall of turned bricks in a binary STL: corners off by 1e-7 of their coordinates, faces quads again."""
     turn = Rotation.from_rotvec([0.1, 0.7, -0.4]).as_matrix()
