@@ -6,26 +6,33 @@ bodies compress it,
 
     R_k = ∫ u*·∇N_k dV + (G V)_k - (dt/ρ) Σ_i k_ij (X_k - x_i)/ϑ_ij,        G_k = Σ_j G_j,                    (1)
 
-and its pressure over the step is that of its gas (`gas.py`), linear about the volume at the beginning:
+and its pressure over the step is that of its gas (`gas.py`) in the middle of it,
 
-    X_k + known_k = P^n + θ_k dt S ((1-θ_k) R^n + θ_k R_k),        S = -dP/dV.                                (2)
+    X_k + known_k = P(V' + dt R^n/2) + dt S ((R_k - R^n)/4 + (θ_k - 1/2) R_k),        S = -dP/dV there,         (2)
 
-With C = 1/(θ_k² S dt) this is a row like all others, symmetric and positive, in which the pressure of the pocket enters
-at the crossing of every edge to its nodes as zero does where the air is open:
+with V' the volume above the surface as the step has already moved it, and with the bodies where their last velocity
+takes them.  The surface moves with R^n + (R^n - R^{n-1})/2, so that V' + dt R^n/2 advances by dt R^n from step to step:
+leapfrog, which with 1/4 is neutral at any ratio of the step and the period.  (P taken from V^n, before the surface
+moved, drove every cushion that fewer than some 24 steps a period resolve, to three to thirty times its energy.)
 
-    (C + Σ s) X_k - Σ s x_i = ∫ u*·∇N_k dV + (G V)_k + C (P^n - known_k) + R^n (1-θ_k)/θ_k,                (3)
+With γ_k = θ_k - 1/4 and C = 1/(γ_k S dt) this is a row like all others, symmetric and positive; the pressure of
+the pocket enters it at the crossing of every edge to its nodes as zero does where the air is open:
+
+    (C + Σ s) X_k - Σ s x_i = ∫ u*·∇N_k dV + (G V)_k + C (P(V' + dt R^n/2) - known_k) - R^n/(4 γ_k),         (3)
 
 with s = (dt/ρ) k_ij/ϑ_ij.  So neither a stiff cushion nor a soft one limits the step, and a pocket loads a body in the
 same way as water does.  θ_k is 1/2, which keeps the energy of a cushion that the steps resolve; where R changed its
-sign from one step to the next it is 1 for a step, so that a cushion too stiff to be resolved comes to rest.
+sign from one step to the next it is 1 for a step, so that a cushion too stiff to be resolved comes to rest.  Where no
+earlier step has a rate, R^n is (V^n - V')/dt; a pocket that merges, parts or is closed off has V' = V^n - dt R^n.
 
 Air that leaves through openings (`leaks.py`) is taken off R_k in (2), as the volume it has in the pocket,
 
     W_k = Σ g_kl (P_k - P_l),        P = X + known,        g = (V/V_a) q/(P_k - P_l),                        (4)
 
 P = 0 in the open air, with g at a pressure half way between that over the last step and the one to which (2) and the
-law of the openings lead at the last rate R^n.  The conductances g/θ_k add a symmetric, positive matrix to (3); the flow
-does not give energy, and is exact where it is steady.  What left is found at the end of the step from the volumes then.
+law of the openings lead at the last rate R^n.  The conductances g θ_k/γ_k add a symmetric, positive matrix to (3);
+the flow does not give energy, and is exact where it is steady.  What left is found at the end of the step from the
+volumes then.
 """
 
 from __future__ import annotations
@@ -137,13 +144,14 @@ class Cushions:
     """The K pockets of a step.
 
     air: their contents, with the labels of the new surface · volume (K,) [m³] and pressure (K,) [Pa], P^n, at the
-    beginning · stiffness (K,) [Pa/m³] S · theta (K,) · known (K,) [Pa] part of the pressure that is not sought · links
-    csr (n, K) s of (3) [m³/(s Pa)] · openings through which air leaves · leak (K, K) [m³/(s Pa)]: g/θ_k of (4), None
-    without openings."""
+    beginning · middle (K,) [Pa] P(V' + dt R^n/2) · stiffness (K,) [Pa/m³] S · theta (K,) · known (K,) [Pa] part of
+    the pressure that is not sought · links csr (n, K) s of (3) [m³/(s Pa)] · openings through which air leaves · leak
+    (K, K) [m³/(s Pa)]: g θ_k/γ_k of (4), None without openings."""
 
     air: Air
     volume: Array
     pressure: Array
+    middle: Array
     stiffness: Array
     theta: Array
     openings: Openings | None = None
@@ -152,10 +160,11 @@ class Cushions:
     links: sp.csr_array | None = None
 
     @classmethod
-    def of(cls, air: Air, topology, before, phi, lets_air_out, taken) -> Cushions:
-        """Pockets below the new surface phi (N,) [m] from those below `before` (N,) [m].
+    def of(cls, air: Air, topology, before, phi, lets_air_out, taken, moving, dt: float) -> Cushions:
+        """Pockets below the new surface phi (N,) [m] from those below `before` (N,) [m], dt [s] earlier.
 
-        taken (N,) [m³]: as in `Air.volumes`; the old pockets are measured with it."""
+        taken (N,) [m³]: as in `Air.volumes`; the old pockets are measured with it · moving (N,) [m³/s]: what the bodies
+        take in addition."""
         t, gas = topology, air.gas
         before_volume = air.volumes(t, before, taken)
         label, count = labelled(t, phi, lets_air_out)
@@ -188,9 +197,13 @@ class Cushions:
             let_go=let_go,
             opened=opened,
         )
-        theta = np.where(now.turned, SETTLING, RESOLVED)
-        stiffness = gas.stiffness(reference, volume)
-        return cls(air=now, volume=volume, pressure=pressure, stiffness=stiffness, theta=theta)
+        ahead = np.where(same, now.volumes(t, phi, taken + dt * moving), volume - dt * now.rate)
+        first = now.turned & (now.rate == 0.0)
+        now = replace(now, rate=np.where(first, (volume - ahead) / dt, now.rate))
+        theta = np.where(now.turned & ~first, SETTLING, RESOLVED)
+        half_way = ahead + 0.5 * dt * now.rate
+        stiffness, middle = gas.stiffness(reference, half_way), gas.pressure(reference, half_way)
+        return cls(air=now, volume=volume, pressure=pressure, middle=middle, stiffness=stiffness, theta=theta)
 
     def __len__(self) -> int:
         return len(self.pressure)
@@ -208,7 +221,7 @@ class Cushions:
             lower + 0.5 * (np.abs(one - other) + np.abs(last)), lower, openings.area
         )
         thinner = openings.mean(self.volume / np.maximum(air.reference, SMALLEST_VOLUME))
-        weighted = conductance * thinner * openings.mean(1.0 / self.theta)
+        weighted = conductance * thinner * openings.mean(self.theta / self.implicit)
         return replace(self, openings=openings, leak=openings.laplacian(weighted, len(self)))
 
     def beside(self, graph, phi, dofs, theta: float, kick, scale: float) -> Cushions:
@@ -238,17 +251,22 @@ class Cushions:
         ahead = self.pressure + 2.0 * self.stiffness * dt * np.minimum(rate, 0.0)
         return float(min(ahead.min(initial=0.0), 0.0))
 
+    @property
+    def implicit(self) -> Array:
+        """γ_k (K,) of (3)."""
+        return self.theta - 0.25
+
     def compliance(self, dt: float) -> Array:
         """C (K,) [m³/(s Pa)] of (3)."""
-        return 1.0 / (self.theta**2 * self.stiffness * dt)
+        return 1.0 / (self.implicit * self.stiffness * dt)
 
     def source(self, dt: float) -> Array:
         """Right hand side (K,) [m³/s] of (3) without the flow of the water and the bodies."""
-        out = self.compliance(dt) * (self.pressure - self.known) + self._carried_rate()
+        out = self.compliance(dt) * (self.middle - self.known) + self._carried_rate()
         return out if self.leak is None else out - self.leak @ self.known
 
     def _carried_rate(self):
-        return self.air.rate * (1.0 - self.theta) / self.theta
+        return -0.25 * self.air.rate / self.implicit
 
     def matrix(self, matrix, dt: float):
         """The matrix (n, n) of the water with the rows of the pockets behind it, csr (n + K, n + K)."""
@@ -306,7 +324,7 @@ class Cushions:
     def after(self, x, theta: float, dt: float) -> Air:
         """The air after a step with the unknown part x (K,) [Pa] of its pressure."""
         mean_pressure = x + self.known
-        rate = self.compliance(dt) * (mean_pressure - self.pressure) - self._carried_rate()
+        rate = self.compliance(dt) * (mean_pressure - self.middle) - self._carried_rate()
         if self.leak is not None:
             rate = rate + self.leak @ mean_pressure
         turned = (rate * self.air.rate < 0.0) & ~self.air.turned

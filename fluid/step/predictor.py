@@ -336,7 +336,8 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         from fluid.air.leaks import Openings
 
         taken = water.coupling @ water.moved_on.ravel()
-        cushions = Cushions.of(water.air, t, water.level_set, phi, water.lets_air_out, taken)
+        moving = water.coupling @ water.pushed_by.ravel()
+        cushions = Cushions.of(water.air, t, water.level_set, phi, water.lets_air_out, taken, moving, dt)
         cushions = cushions.leaking(Openings.of(water, cushions.air.label), dt)
         cushions = cushions.beside(graph, phi, dofs, theta, kick, dt / density)
     kept = Predicted(
