@@ -93,7 +93,6 @@ def fall(speed: float) -> tuple[np.ndarray, np.ndarray]:
         there = bodies.moved(start - np.array([0.0, 0.0, speed * water.time]))
         again = cut_domain(mesh, there, "multiple", previous=water.domain, moved=np.ones(2, bool))
         water.move_solids(again)
-        water.pushed_by = np.zeros((2, 6))
     time, pressure = np.array(rows).T
     return time, pressure
 
