@@ -31,6 +31,7 @@ from fluid.cut.recut import joined
 from fluid.domain.continued_nodes import pick_old_nodes
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.domain.covers import Connection, lies_on, virtual_cells, without_pockets
+from fluid.domain.open_columns import OpenColumns
 from fluid.mesh.arrays import Hats, WettedPolygons
 from fluid.mesh.background import Background
 from kernels.decorators import kernel
@@ -125,6 +126,11 @@ class PhysicalDomain:
         wetted = np.flatnonzero(row)
         row[wetted] = np.arange(len(wetted))
         return Hats(self.cells, row, self.memory.mesh.gradients_of(self.parent_cell[wetted]))
+
+    @cached_property
+    def open_columns(self) -> OpenColumns:
+        """What the solids leave of the columns of bins."""
+        return OpenColumns.of(self)
 
     @cached_property
     def is_cut(self) -> Array:

@@ -13,6 +13,7 @@ the bricks that were split into tetrahedra; for any other mesh they are uniform 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -219,14 +220,32 @@ class Background:
     def plan(self) -> sp.csr_array:
         """(M, nx ny) share of each cell in each column of bins, number i ny + j: that of the rectangle around the cell
         in the plan. A cell that straddles no columns is in one of them."""
-        x, y, _ = self.axes
-        corners = (self.nodes[self.cells[some], :2] for some in spans(len(self.cells)))
-        count, column, share = zip(
-            *(_shares((x, y), *_shrunk(c.min(axis=1), c.max(axis=1))) for c in corners)
-        )
+        return self._shares_along((0, 1))
+
+    @cached_property
+    def layers(self) -> sp.csr_array:
+        """(M, nz) share of each cell in each layer of bins: that of the height of the box around it."""
+        return self._shares_along((2,))
+
+    def bin_volume(self, cells, volume) -> sp.csr_array:
+        """(nx ny, nz) [m³] in the bins of each column of volumes (n,) [m³] of cells (n,), by `plan` and `layers`."""
+        held = self.layers[cells]
+        held.data *= np.repeat(volume, np.diff(held.indptr))
+        return self.plan[cells].T.tocsr() @ held
+
+    @cached_property
+    def volume_of_bins(self) -> sp.csr_array:
+        """`bin_volume` of all cells."""
+        return self.bin_volume(np.arange(len(self.cells)), self.cell_volume)
+
+    def _shares_along(self, along) -> sp.csr_array:
+        """(M, bins) share of the box around each cell in each bin of the axes with the numbers `along`."""
+        axes = [self.axes[k] for k in along]
+        corners = (self.nodes[self.cells[some]][:, :, along] for some in spans(len(self.cells)))
+        count, number, share = zip(*(_shares(axes, *_shrunk(c.min(axis=1), c.max(axis=1))) for c in corners))
         start = np.concatenate([[0], np.cumsum(np.concatenate(count))])
-        shape = (len(self.cells), (len(x) - 1) * (len(y) - 1))
-        return sp.csr_array((np.concatenate(share), np.concatenate(column), start), shape=shape)
+        shape = (len(self.cells), math.prod(len(axis) - 1 for axis in axes))
+        return sp.csr_array((np.concatenate(share), np.concatenate(number), start), shape=shape)
 
     @cached_property
     def skfem(self) -> MeshTet:
@@ -327,19 +346,20 @@ def bin_of(axis, x) -> Array:
 
 
 def _shares(axes, low, high):
-    """Columns of bins that the rectangles from low to high (n, 2) reach: count (n,), number (k,) of each column, and
-    share (k,) of its rectangle that lies in it."""
-    first, last = (np.column_stack([bin_of(axes[k], x[:, k]) for k in range(2)]) for x in (low, high))
+    """Bins of one or two axes that the intervals or rectangles from low to high (n, axes) reach: count (n,), number
+    (k,) of each bin, and share (k,) of its rectangle that lies in it."""
+    first, last = (np.column_stack([bin_of(a, x[:, k]) for k, a in enumerate(axes)]) for x in (low, high))
     across = last - first + 1
     count = across.prod(axis=1)
     of = np.repeat(np.arange(len(low)), count)
     rank = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
-    at = (first[of, 0] + rank // across[of, 1], first[of, 1] + rank % across[of, 1])
-    area = np.ones(len(of))
+    along = divmod(rank, across[of, -1])[-len(axes) :]
+    at = [first[of, k] + steps for k, steps in enumerate(along)]
+    area, number = np.ones(len(of)), np.zeros(len(of), np.int64)
     for k, axis in enumerate(axes):
         area *= np.minimum(high[of, k], axis[at[k] + 1]) - np.maximum(low[of, k], axis[at[k]])
-    column = at[0] * (len(axes[1]) - 1) + at[1]
-    return count, column.astype(np.int32), area / np.bincount(of, area, minlength=len(low))[of]
+        number = number * (len(axis) - 1) + at[k]
+    return count, number.astype(np.int32), area / np.bincount(of, area, minlength=len(low))[of]
 
 
 def _fill_bins(low, high, nx, ny, nz):

@@ -13,8 +13,8 @@ Manning, for beds under water of depth d, with the mean velocity U over the dept
     τ = ρ C_f |U| U,   C_f = g n² / d^(1/3)                                                       (2)
 
 on the floor and on faces of solids that point upwards (n_z > 0.5); d and U are those of the water in the column of
-cells, with d at least one cell.  The stress acts on the water at the bed, and the turbulence that it makes carries it
-up:
+cells, with d over the area that solids leave open (`OpenColumns`) and at least one cell.  The stress acts on the water
+at the bed, and the turbulence that it makes carries it up:
 
     ν_t = u_* d max(κ/6, 2/3 sqrt(C_f)),   u_* = sqrt(C_f) |U|                                    (3)
 
@@ -152,9 +152,9 @@ def log_law(distance, roughness: float):
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of water over the bins of the plan: depth (c,) [m], volume over area · velocity (c, 3) [m/s], mean over
-    the water · left (c,): share of the velocity that friction leaves · centre (c, 2) [m] · of_water: the Water they
-    belong to."""
+    """Columns of water over the bins of the plan: depth (c,) [m], volume over the area that solids leave open
+    (`OpenColumns`) · velocity (c, 3) [m/s], mean over the water · left (c,): share of the velocity that friction leaves
+    · centre (c, 2) [m] · of_water: the Water they belong to."""
 
     depth: Floats
     velocity: Floats
@@ -169,11 +169,13 @@ class Columns:
         wet = t.cells_around(phi < 0.0)
         area = np.outer(np.diff(x), np.diff(y)).ravel()
         there, held = _columns(water, wet).T, t.volume[wet] * wet_fraction(wet, phi, t.parts)
-        volume, total = there @ held, there @ (held[:, None] * u[t.cells[wet]].mean(axis=1))
+        a, b, c, d = t.cells[wet].T
+        volume, total = there @ held, there @ (held[:, None] * (0.25 * (u[a] + u[b] + u[c] + u[d])))
         middle = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
         centre = np.column_stack([a.ravel() for a in middle])
         mean = total / np.maximum(volume, 1e-300)[:, None]
-        return cls(volume / area, mean, np.ones(len(area)), centre, water)
+        depth = water.domain.open_columns.depth(volume, area)
+        return cls(depth, mean, np.ones(len(area)), centre, water)
 
     def over(self, cells):
         """Depth (n,) [m], velocity (n, 3) [m/s] and share left (n,) of the columns that cells (n,) of the domain stand

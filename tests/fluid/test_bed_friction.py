@@ -123,3 +123,68 @@ def test_beds_of_several_kinds_rub_where_they_are():
     x = water.topology.nodes[:, 0]
     rough, smooth = drag[x < 0.9].sum() / 0.9, drag[x > 1.1].sum() / 0.9
     assert rough == pytest.approx(4.0 * smooth, rel=0.1)
+
+
+HOUSE = ([2.0, 2.0, 1.0], [1.8, 1.8, 3.0])
+"""Centre and size [m]: covers four fifths of the width of the columns at its sides, on cells of 0.5 m."""
+
+
+def depths(mesh, solids, level, covers="multiple"):
+    """Depth (n,) [m] in Manning's law of the cells that hold still water up to the level [m], and the Water."""
+    centre, size = zip(*solids)
+    domain = cut_domain(mesh, ConvexBodies.boxes(centre, size), covers)
+    settings = WaterParameters(walls="friction", manning=0.03)
+    water = Water(mesh, domain, lambda x: x[:, 2] - level, settings)
+    wet = (water.level_set[water.topology.cells] < 0.0).any(axis=1)
+    columns = Columns.of(water, water.level_set, np.zeros((len(water.level_set), 3)))
+    return columns.over(np.flatnonzero(wet))[0], water
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+@pytest.mark.parametrize("levels", [0, 1])
+@pytest.mark.parametrize("bed", [0.0, 0.35])
+@pytest.mark.parametrize("level", [0.93, 1.5])
+def test_the_depth_beside_a_house_is_that_of_the_water(level, bed, levels, covers):
+    """Over the whole area of the columns it was 0.3 and 0.54 m beside the house in water of 1.5 m. The bed is a solid
+    that cuts the lowest cells."""
+    mesh = box_mesh(np.zeros(3), [4.0, 4.0, 2.0], 0.5)
+    if levels:
+        mesh = refined_mesh(mesh, [InBox((0, 0, 0), (1.9, 4, 2), levels)])
+    solids = [HOUSE, ([2.0, 2.0, bed - 1.0], [9.0, 9.0, 2.0])]
+    found, _ = depths(mesh, solids if bed else solids[:1], level, covers)
+    np.testing.assert_allclose(found, level - bed, rtol=1e-6)
+
+
+def test_friction_beside_a_house_is_that_of_open_water():
+    """The drag on the floor over its area is the same everywhere; it was up to 44 % larger at the house."""
+    mesh = box_mesh(np.zeros(3), [4.0, 4.0, 2.0], 0.5)
+    _, water = depths(mesh, [HOUSE], 1.5)
+    friction = water.viscous.friction
+    u = np.tile([2.0, 0.0, 0.0], (len(water.level_set), 1))
+    columns = friction.columns(water, water.level_set, u, 0.0)
+    drag = friction.of_nodes(water, water.level_set, columns, u)
+    area = np.linalg.norm(water.walls.rough_area, axis=1)[water.walls.rough_area[:, 2] < 0.0].sum()
+    assert area == pytest.approx(16.0 - 1.8**2)
+    assert drag.sum() / area == pytest.approx(1000.0 * 9.81 * 0.03**2 / 1.5 ** (1 / 3) * 2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.0, 0.8), (1.2, 2.5), (1.1, 1.4)], ids=["roof under water", "block afloat", "deck"]
+)
+def test_columns_with_water_above_or_below_a_solid_have_its_mean_depth(low, high):
+    """1.5 m less what a solid takes of the column: nowhere is the depth that of the part beside it."""
+    mesh = box_mesh(np.zeros(3), [4.0, 4.0, 2.0], 0.5)
+    found, _ = depths(mesh, [([2.0, 2.0, 0.5 * (low + high)], [1.8, 1.8, high - low])], 1.5)
+    covered = np.array(
+        [0.0, 0.8, 0.64, 1.0]
+    )  # of columns away from it, at a side, at a corner, over or under it
+    np.testing.assert_allclose(
+        np.unique(found.round(6)), np.unique((1.5 - covered * (min(high, 1.5) - low)).round(6))
+    )
+
+
+def test_a_column_with_next_to_no_open_area_keeps_its_depth():
+    """A house that ends 1e-6 of a cell before the next column."""
+    mesh = box_mesh(np.zeros(3), [4.0, 4.0, 2.0], 0.5)
+    found, _ = depths(mesh, [([2.0, 2.0, 1.0], [2.0 - 1e-6, 2.0 - 1e-6, 3.0])], 1.5)
+    np.testing.assert_allclose(found, 1.5, rtol=1e-4)
