@@ -37,6 +37,7 @@ class Topology:
     cut cells · parts: the fluid parts of the cells · obtuse (M,) bool: cells with obtuse dihedral
     angles, is_obtuse: the mesh has such cells · upright (rows of `gradients`,) bool: `Background.upright` ·
     node_size (N,) [m]: `Background.node_size`, slanting, sloping_bed (N,) bool: as in `Background` ·
+    divided (N,) bool: copies of a node that has several ·
     spacing [m] of the mesh."""
 
     nodes: Floats
@@ -64,6 +65,7 @@ class Topology:
     node_size: Floats
     slanting: Bools
     sloping_bed: Bools
+    divided: Bools
     spacing: float
 
     @classmethod
@@ -111,6 +113,7 @@ class Topology:
             node_size=mesh.node_size[domain.parent_node],
             slanting=mesh.slanting[domain.parent_node],
             sloping_bed=mesh.sloping_bed[domain.parent_node],
+            divided=(np.bincount(domain.parent_node) > 1)[domain.parent_node],
             spacing=mesh.spacing,
         )
 

@@ -278,7 +278,9 @@ def _slow(nodes, t, motion):
 def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
     """φ (N,) in place at those of the nodes `beside` the cut cells that lie dry inside a solid or on a sloping bed of
     the mesh, in slow water: continued with its slope in the cut cells, to no larger distance than that to the closest
-    polygon; inside a solid to either side of the surface, on a bed no flatter than LEAST_SLOPE.
+    polygon; inside a solid to either side of the surface, on a bed no flatter than LEAST_SLOPE. A node of which a thin
+    wall leaves several copies stays dry: the cells beside the edge of the wall have the slope of the water on its other
+    side, too, and a plate afloat on a layer of nodes was wetted from below through its edges.
 
     front (N,) bool: corners of the cut cells. Not inside solids on meshes with obtuse cells, where the paths of such
     nodes are continued (`paths_in_solids.py`)."""
@@ -290,5 +292,5 @@ def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
     slope = mean_gradients(cut, front, value, t.fluid_cells, front)
     layers, no_limit = np.array([0, 0, len(found)]), np.zeros(0)
     continue_outward(found, layers, 1, value, slope, t.nodes, t.around_by_cells, front.copy(), no_limit)
-    least = np.where(t.sloping_bed[found], LEAST_SLOPE, -1.0)
+    least = np.where(t.sloping_bed[found], LEAST_SLOPE, np.where(t.divided[found], 0.0, -1.0))
     phi[found] = np.clip(value[found, 0], least * phi[found], phi[found])
