@@ -20,6 +20,13 @@ reach farther than t beyond the side, s stays, too. Wet or dry, such nodes bent 
 
 Sides that follow an outer edge of a solid cut no cells short at a node beside that edge; but where no fluid part of the
 cells around a node is dry for lying beyond a side alone, this is no surface there either (`_hidden_sides`).
+Nor at the top of a box where a solid lies at the surface. Below a plate, or the lowest part of a raft, that dips less
+than a cell into the water, the nodes on its lower side lie above the surface, behind its face. At its edges the surface
+shows, and its cells hold nodes of both kinds: a node that is wet below the plate beside one that is dry above it bend
+the surface, and hydrostatics would have to pull at the wet one. So the plane goes on through the solid, from its edges
+to its middle (`_through_solids`), and these nodes are dry: the pressure of the plane acts on the face below them. Where
+no edge shows the surface, under a lid from wall to wall, the water has none.
+
 An edge of a box that lies on planes of nodes has all corners of some cells on the surface, where the diagonal of the
 bricks runs across the edge, and cells without a corner in the water are dry: half a brick along the edge. There the
 nodes on the edge lie in the water, by EDGE of a cell: a tenth of a brick too much instead of half of one too little. By
@@ -85,8 +92,11 @@ def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
     cut_high = whole_high[domain.parent_node] - high > MISSING * edges[:, None]
     faced_low, faced_high = _facing(domain)
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
-    hidden = _hidden_sides(boxes, tank, domain, FLUSH * edge)
-    found = [_box_level(box, tank, stars, domain, edges, *of) for box, of in zip(boxes, hidden)]
+    hidden, goes_through = _hidden_sides(boxes, tank, domain, FLUSH * edge, SEAM * edge)
+    found = [
+        _box_level(box, tank, stars, domain, edges, *of, through)
+        for box, of, through in zip(boxes, hidden, goes_through)
+    ]
     levels = np.array([of_box for of_box, _ in found])
     for box, of_box in zip(boxes, levels):
         if box.top is not None:
@@ -139,16 +149,18 @@ class _Corners:
         return nodes
 
 
-def _hidden_sides(boxes, tank, domain, slack: float) -> list[tuple[Array, Array]]:
+def _hidden_sides(
+    boxes, tank, domain, slack: float, seam: float
+) -> tuple[list[tuple[Array, Array]], list[Array]]:
     """Of each box the lower and upper sides, (N, 3) bool each, that are no surface near a node of a cut cell: no corner
     of the fluid parts near it is dry for lying beyond this side alone, give or take slack [m], while some are in the
-    box."""
+    box; and of each box the nodes (N,) bool at which its top goes on through a solid (`_through_solids`)."""
     none = np.zeros((len(domain.nodes), 3), bool)
     if not domain.is_cut.any():
-        return [(none, none)] * len(boxes)
+        return [(none, none)] * len(boxes), [none[:, 0]] * len(boxes)
     corners, (tank_low, tank_high) = _Corners(domain), tank
     dry = ~np.any([_in_box(box, tank, corners.points, slack) for box in boxes], axis=0)
-    hidden = []
+    hidden, goes_through = [], []
     for box in boxes:
         low, high = np.array(box.lower), np.array(box.upper)
         below = (corners.points < low - slack) & (low > tank_low)
@@ -159,8 +171,28 @@ def _hidden_sides(boxes, tank, domain, slack: float) -> list[tuple[Array, Array]
         for past in (below, above):
             seen = [corners.around(past[:, k] & dry & (beyond == 1)) for k in range(3)]
             sides.append(meets[:, None] & ~np.stack(seen, axis=1))
+        through = none[:, 0]
+        if box.top is None and box.upper[2] < tank_high[2]:
+            through = _through_solids(domain, box.upper[2], corners.beside & seen[2], seam)
+            sides[1][:, 2] &= ~through
         hidden.append((sides[0], sides[1]))
-    return hidden
+        goes_through.append(through)
+    return hidden, goes_through
+
+
+def _through_solids(domain, top: float, seen, slack: float) -> Array:
+    """Nodes (N,) bool at which a surface at the height `top` [m] goes on through the solids that it meets: from the
+    nodes `seen` (N,) bool beside which it shows, from cell to cell that a solid cuts and that reaches the surface on
+    either side, give or take slack [m]."""
+    z, cells = domain.nodes[:, 2], domain.cells[domain.is_cut]
+    meets = (z[cells].min(axis=1) < top + slack) & (z[cells].max(axis=1) > top - slack)
+    cells = cells[meets]
+    found, reached, before = np.zeros(len(z), bool), seen, -1
+    while reached.sum() > before:
+        before = reached.sum()
+        found[cells[reached[cells].any(axis=1)]] = True
+        reached = seen | found
+    return found
 
 
 def _behind(domain) -> Array:
@@ -298,10 +330,10 @@ class _Faces(NamedTuple):
 
 
 def _box_level(
-    box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_high: Array
+    box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_high: Array, through: Array
 ) -> tuple[Array, Array]:
     """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least,
-    and which nodes (N,) bool lie on two of them."""
+    its top kept at the nodes `through` (N,) bool, and which nodes (N,) bool lie on two of them."""
     nodes, low, high, cut_low, cut_high = stars
     (box_low, box_high, _), (tank_low, tank_high) = box, tank
     level, ends = np.full(len(nodes), -np.inf), np.zeros(len(nodes), np.int64)
@@ -313,6 +345,8 @@ def _box_level(
             faces = _Faces(domain, k, plane, 1.0, edge)
             side = _side(s, s_low, s_high, cut_low[:, k], cut_high[:, k], faces)
             side = np.where(hidden_high[:, k], np.minimum(side, -edge), side)
+            if k == 2:
+                side = np.where(through, s, side)
             level, ends = np.maximum(level, side), ends + _close_to(side, edge)
         if box_low[k] > tank_low[k]:
             plane = box_low[k]

@@ -241,3 +241,70 @@ def test_the_first_mode_of_a_tank_from_a_slope_of_its_surface_swings_in_its_peri
     assert moving.max() == pytest.approx(
         0.5 * 9810.0 * 0.5 * 0.02**2 / 12.0, rel=0.1
     )  # the potential energy of the slope
+
+
+@pytest.mark.parametrize("split", ["kuhn", "mirrored"])
+@pytest.mark.parametrize(
+    ("level", "lower", "thickness"),
+    [
+        (0.35, 0.34, 0.014),
+        (0.35, 0.325, 0.015),
+        (0.35, 0.352, 0.012),
+        (0.35, 0.28, 0.09),
+        (3 * CELL, 0.364, 0.015),
+        (3 * CELL, 0.35, 0.02),
+        (3 * CELL, 0.379, 0.012),
+    ],
+    ids=[
+        "afloat",
+        "under water",
+        "over water",
+        "thick",
+        "on nodes",
+        "on nodes under water",
+        "on nodes over water",
+    ],
+)
+def test_water_under_a_plate_at_the_surface_is_at_rest(split, level, lower, thickness):
+    """The copies of nodes on the lower side of a plate at the surface lie above the water. The surface was taken away
+    over the middle of plates some cells wide, but not at their edges, and water moved at 0.1 to 0.5 m/s. On a layer of
+    nodes the copies above the plate were wetted through its edges."""
+    tank = ((0.0, 0.0, 0.0), (1.0, 1.0, 0.5))
+    centre = np.array([[0.51, 0.49, lower + 0.5 * thickness]])
+    solid = ConvexBodies.boxes(centre, np.array([[0.77, 0.77, thickness]]))
+    mesh = box_mesh(*tank, CELL, split=split)
+    domain = cut_domain(mesh, solid, "multiple")
+    water = Water(
+        mesh, domain, start_level([(tank[0], (1.0, 1.0, level))], tank, mesh, domain), WaterParameters()
+    )
+    for _ in range(8):
+        problem, x = advance(water)
+    assert np.abs(water.velocity).max() < 1e-7
+    wet = min(max(level - lower, 0.0), thickness)
+    assert problem.load(x)[0, 2] == pytest.approx(9810.0 * 0.77**2 * wet, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("draught", [0.0, 0.05])
+def test_water_under_a_light_raft_is_at_rest(draught):
+    """Thicker than a cell, with a draught of less: the nodes above its lower face have no other side, as in a plate
+    with single covers."""
+    tank, level = ((0.0, 0.0, 0.0), (1.0, 1.0, 0.75)), 0.35
+    centre = np.array([[0.51, 0.49, level - draught + 0.15]])
+    mesh = box_mesh(*tank, CELL)
+    domain = cut_domain(mesh, ConvexBodies.boxes(centre, np.array([[0.77, 0.77, 0.3]])))
+    water = Water(
+        mesh, domain, start_level([(tank[0], (1.0, 1.0, level))], tank, mesh, domain), WaterParameters()
+    )
+    for _ in range(8):
+        advance(water)
+    assert np.abs(water.velocity).max() < 1e-7
+
+
+def test_a_box_that_ends_in_a_closed_lid_has_no_surface_under_it():
+    """The lid goes from wall to wall, and no edge of it shows the top of the box."""
+    solid = ConvexBodies.boxes(np.array([[0.5, 0.25, 0.36]]), np.array([[1.002, 0.502, 0.03]]))
+    mesh = box_mesh(*TANK, CELL)
+    domain = cut_domain(mesh, solid, "multiple")
+    level = start_level([((0.0, 0.0, 0.0), (1.0, 0.5, 0.35))], TANK, mesh, domain)
+    below = np.unique(domain.cells[domain.centroid_of(np.arange(len(domain.cells)))[:, 2] < 0.345])
+    assert (level[below] < 0.0).all()

@@ -34,6 +34,20 @@ def floating_box(scene, centre_z, level, cell=0.025):
     )
 
 
+def floating_plate(scene, bottom, level, cell, middle=(1.0, 1.0), **water):
+    """A timber plate, 1 m x 1 m x 20 mm, in a pool of 2 m x 2 m, with both of its sides apart: its draught is 15 mm."""
+    return scene(
+        time={"end": 3.0, "step_max": 0.02},
+        tank={"lower": [0, 0, 0], "upper": [2, 2, 1.5], "cell": cell},
+        water={"covers": "multiple", "fill": [{"lower": [0, 0, 0], "upper": [2, 2, level]}], **water},
+        structure={
+            "density": 750.0,
+            "block": [{"name": "plate", "size": [1, 1, 0.02], "centre": [*middle, bottom + 0.01]}],
+        },
+        contact={"stiffness": 2e7, "friction": 0.5},
+    )
+
+
 def cube(scene, density, step=0.005, side=0.3):
     """A cube free in the middle of a pool, well under the surface."""
     return scene(
@@ -153,3 +167,33 @@ def test_plates_that_joints_hold_stay_afloat_without_lifting_the_water(scene):
     run(coupling, 0.01, lambda record: errors.append(record.balance.energy_error))
     assert coupling.structure.joint_damage()[0].max() < 1e-3
     assert max(errors) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("level", "cell", "openings"),
+    [(0.95, 1 / 6, "all"), (0.95, 0.25, "edges"), (1.0, 1 / 6, "all"), (1.0, 1 / 6, "wide")],
+    ids=["between nodes", "wide cells", "on nodes", "on nodes, wide openings"],
+)
+def test_a_plate_thinner_than_its_cells_at_its_draught_stays(scene, level, cell, openings):
+    """It was lifted with 261 to 288 N instead of its weight of 147 N, and the run ended after 0.01 s."""
+    coupling = floating_plate(scene, level - 0.015, level, cell, openings=openings)
+    before, lift = coupling.structure.centre()[0], []
+    run(coupling, 0.25, lambda record: lift.append(record.load[0, 2]))
+    assert lift == pytest.approx(np.full(len(lift), 0.015 * RHO * G), rel=1e-6)
+    assert np.abs(coupling.structure.centre()[0] - before).max() < 1e-8
+
+
+@pytest.mark.parametrize("raised", [0.005, -0.003], ids=["raised", "pushed down"])
+def test_a_thin_plate_comes_to_its_draught(scene, raised):
+    """The middle of the plate is away from those of the cells: its edges do not lie on planes of nodes."""
+    coupling = floating_plate(scene, 0.935 + raised, 0.95, 1 / 6, (1.04, 1.03))
+    lift, errors = [], []
+
+    def note(record):
+        lift.append(record.load[0, 2])
+        errors.append(record.balance.energy_error)
+
+    run(coupling, 1.5, note)
+    assert np.mean(lift[-30:]) == pytest.approx(0.015 * RHO * G, rel=0.01)
+    assert coupling.structure.centre()[0, 2] == pytest.approx(0.945, abs=1e-3)
+    assert np.abs(errors).max() < 0.02
