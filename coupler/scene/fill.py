@@ -20,7 +20,8 @@ reach farther than t beyond the side, s stays, too. Wet or dry, such nodes bent 
 
 Sides that follow an outer edge of a solid cut no cells short at a node beside that edge; but where no fluid part of the
 cells around a node is dry for lying beyond a side alone, this is no surface there either (`_hidden_sides`).
-Nor at the top of a box where a solid lies at the surface. Below a plate, or the lowest part of a raft, that dips less
+
+The top of a box goes on through solids at the surface. Below a plate, or the lowest part of a raft, that dips less
 than a cell into the water, the nodes on its lower side lie above the surface, behind its face. At its edges the surface
 shows, and its cells hold nodes of both kinds: a node that is wet below the plate beside one that is dry above it bend
 the surface, and hydrostatics would have to pull at the wet one. So the plane goes on through the solid, from its edges
