@@ -36,7 +36,7 @@ from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gat
 from fluid.surface.cavities import on_one_side
 from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
-from fluid.surface.volume import FluxAhead, nodal_volume, renumbering
+from fluid.surface.volume import FluxAhead, nodal_volume, renumbering, room_of_heirs
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
 from kernels.decorators import ranged
@@ -406,7 +406,8 @@ class Water:
         self._carry_cells(old, source)
         self._find_band()
         if not np.array_equal(source, np.arange(len(source))):
-            handed_on = renumbering(source, old.parent_node, domain.parent_node, self.topology.node_volume)
+            room = room_of_heirs(self.topology, self.level_set, source)
+            handed_on = renumbering(source, old.parent_node, domain.parent_node, room)
             self.nodal_water = handed_on @ self.nodal_water
             self.displaced = handed_on @ self.displaced
             self.renumbered = handed_on if self.renumbered is None else handed_on @ self.renumbered

@@ -529,12 +529,31 @@ def nodal_volume(topology, phi):
     return nodal_water(topology.cells_around(phi < 0.0), 0.0, phi, topology.parts, len(topology.nodes))
 
 
+def room_of_heirs(topology, phi, source):
+    """Volume (N,) [m³] in proportion to which new nodes share the water of the old one that they continue, source (N,):
+    what copies of a node that splits hold below the surface φ (N,) [m], or can hold where none of them is wet. Shared
+    by what they can hold alone, the water below a plate that floats came to lie on it where such a node split."""
+    t, room = topology, topology.node_volume
+    some = source >= 0
+    splits = np.zeros(len(room), bool)
+    splits[some] = (np.bincount(source[some]) > 1)[source[some]]
+    if not splits.any():
+        return room
+    held = nodal_water(t.cells_around(splits), 0.0, phi, t.parts, len(room))
+    of_old = np.bincount(source[splits], held[splits], minlength=source.max() + 1)
+    room = room.copy()
+    splits[splits] = of_old[source[splits]] > 0.0
+    room[splits] = held[splits]
+    return room
+
+
 def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:
     """T (N_new, N_old), which passes the volume of every old node on to its copies: W_new = T W_old, columns sum to 1.
 
     source (N_new,): old node that each new one continues, -1 none · parents (N,): background node of each copy ·
-    new_volume (N_new,) [m³], in proportion to which several successors share.  The water of a node without a successor
-    goes to the first copy of its background node; if there is no copy, the last shift (3) restores it."""
+    new_volume (N_new,) [m³], `room_of_heirs`, in proportion to which several successors share.  The water of a node
+    without a successor goes to the first copy of its background node; if there is no copy, the last shift (3) restores
+    it."""
     heir = np.flatnonzero(source >= 0)
     weight = np.maximum(new_volume[heir], 1e-300)
     total = np.bincount(source[heir], weight, minlength=len(old_parent))

@@ -155,3 +155,28 @@ def test_heaving_box_and_water_together_only_lose_energy():
     assert climb < 0.08 * swing
     assert energies[0] - energies[-1] < 0.6 * swing
     assert 0.44 < min(heights) < 0.5
+
+
+def test_copies_of_a_node_that_splits_get_the_water_that_they_hold():
+    """The edges of a plate at the surface pass a plane of nodes by a thousandth of a cell. Copies that nodes beside
+    them split into shared their water by what they can hold, so that most of it came to lie on the plate."""
+    level, cell = 0.35, 0.125
+    mesh = box_mesh((0.0, 0.0, 0.0), (1.0, 1.0, 0.5), cell)
+    inside, beyond = (
+        cut_domain(
+            mesh,
+            ConvexBodies.boxes(np.array([[0.5, 0.5, level]]), np.array([[side, side, 0.02]])),
+            "multiple",
+        )
+        for side in (0.75 - 2e-4, 0.75 + 2e-4)
+    )
+    water = Water(mesh, inside, inside.nodes[:, 2] - level)
+    at_rest = Water(mesh, beyond, beyond.nodes[:, 2] - level)
+    copies = [np.bincount(domain.parent_node, minlength=len(mesh.nodes)) for domain in (inside, beyond)]
+    split = (copies[0] == 1) & (copies[1] > 1)
+    water.move_solids(beyond)
+    assert split.sum() > 10
+    split = split[beyond.parent_node]
+    np.testing.assert_allclose(
+        water.nodal_water[split], at_rest.nodal_water[split], rtol=0.02, atol=1e-4 * cell**3
+    )
