@@ -21,7 +21,7 @@ STAGES = {
         ("transport.surface_momentum", "_jumps"),
         ("transport.surface_momentum", "_pass_on"),
         ("step.predictor", "correct_volume"),
-        ("step.corrector", "edge_flux"),
+        ("surface.volume", "edge_flux"),
     ),
     "pressure matrix": (("step.predictor", "_problem"),),
     "solver, set-up": (("numerics.solve", "Multigrid"),),
