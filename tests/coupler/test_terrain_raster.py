@@ -55,6 +55,28 @@ def test_heights_stored_with_a_scale_and_an_offset(tmp_path):
     np.testing.assert_allclose(found(np.array([11.0]), np.array([39.0])), 7.5 + 0.01 * 3.5, atol=1e-6)
 
 
+TURN_COLUMNS = """
+import sys, rasterio
+with rasterio.open(sys.argv[1]) as file:
+    z, profile = file.read(1)[:, ::-1], file.profile
+profile["transform"] *= rasterio.Affine.translation(30, 0) * rasterio.Affine.scale(-1, 1)
+with rasterio.open(sys.argv[2], "w", **profile) as file:
+    file.write(z, 1)
+"""
+
+
+def test_columns_from_east_to_west_are_read_from_west_to_east(tmp_path):
+    write(tmp_path / "site.tif", "EPSG:32654", 388200.0, 4253000.0, 2.0)
+    words = [sys.executable, "-c", TURN_COLUMNS, tmp_path / "site.tif", tmp_path / "turned.tif"]
+    subprocess.run(words, check=True, capture_output=True)
+    site, turned = (
+        terrain_of(Terrain(path=str(tmp_path / name), origin=(388200.0, 4252960.0)))
+        for name in ("site.tif", "turned.tif")
+    )
+    np.testing.assert_array_equal(turned.x, site.x)
+    np.testing.assert_array_equal(turned.z, site.z)
+
+
 def test_degrees_are_refused_and_reprojected(tmp_path):
     """0.0001 degrees of latitude are 11.1 m; a plane stays one."""
     write(tmp_path / "site.tif", "EPSG:4326", 141.7, 38.4, 1e-4)

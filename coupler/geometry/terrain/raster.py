@@ -73,6 +73,8 @@ def _read(path: str, out: str) -> None:
         notes = [f"band 1 of {file.count}"] if file.count > 1 else []
         scale, offset = file.scales[0], file.offsets[0]
     z = (scale * z + offset).T
+    if t.a < 0:
+        x, z = x[::-1], z[::-1]
     if t.e < 0:
         y, z = y[::-1], z[:, ::-1]
     np.savez(out, x=x, y=y, z=z, crs=crs, notes=np.array(notes, str))
