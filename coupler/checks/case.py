@@ -84,7 +84,13 @@ def remarks(case: Case) -> list[str]:
         *_drawing_remarks(case),
     ]
     found += mesh_remarks(case.tank) if case.tank is not None else []
-    return [*found, *unit_remarks(case), *_window_remarks(case), *_patch_remarks(case)]
+    return [
+        *found,
+        *unit_remarks(case),
+        *_window_remarks(case),
+        *_patch_remarks(case),
+        *_reaction_remarks(case),
+    ]
 
 
 def _drawing_remarks(case: Case) -> Iterator[str]:
@@ -237,6 +243,22 @@ def _window_remarks(case: Case) -> Iterator[str]:
         window = getattr(gauge, "impulse", None)
         if window is not None and window[0] >= case.time.end:
             yield f"gauge '{gauge.name}' begins to add up at {window[0]:g} s, after the end ({case.time.end:g} s)"
+
+
+def _reaction_remarks(case: Case) -> Iterator[str]:
+    """Gauges of what holds blocks of which none is held."""
+    gauges = [gauge for gauge in case.gauge if gauge.kind == "reaction"]
+    if not gauges or case.structure is None:
+        return
+    driven = {motion.block for motion in case.motion}
+    blocks = [(part.name, block) for part in parts_of(case) for block in part.blocks]
+    for gauge in gauges:
+        named = [block for part, block in blocks if gauge.on in (part, block.group, block.name)]
+        if named and not any(block.fixed or block.name in driven for block in named):
+            yield (
+                f"gauge '{gauge.name}' measures what holds '{gauge.on}', and nothing does, so that it reads 0: give it "
+                "fixed = true or a [[motion]], or take a gauge of kind force for the force of the water"
+            )
 
 
 def _patch_remarks(case: Case) -> Iterator[str]:

@@ -571,6 +571,10 @@ def test_a_law_that_does_not_exist_or_has_no_potential_is_refused():
             {"gauge": [{"kind": "flux", "name": "g", "at": [7, 0, 0], "edges": [[0, 10, 0], [0, 0, 5]]}]},
             "75 % of the patch of gauge 'g' lies outside the tank, where nothing flows; its key at is the centre",
         ),
+        (
+            {**structure({"centre": [7, 5, 2]}), "gauge": [{"kind": "reaction", "name": "g", "on": "b0"}]},
+            "gauge 'g' measures what holds 'b0', and nothing does, so that it reads 0",
+        ),
     ],
 )
 def test_values_that_look_like_a_wrong_unit_are_reported(sections, says):
