@@ -488,19 +488,19 @@ def _meet_total(t, near, phi, moved, target, tolerance, spacing):
     moved: the band (n,), c (N,) [m²] and ψ (n,) [m] of (2). Secant steps on s of (3); where they do not reach the
     target within LARGEST_LAST_SHIFT of the cells at each node, on one length for all."""
     band, slope, psi = moved
-    held = nodal_water(near, 0.0, phi, t.parts, len(phi))
-    start = volume = float(held.sum())
-    shifted = phi
-    if abs(target - volume) > tolerance and slope.sum() > 0.0:
-        uniform = np.full(len(band), abs(target - volume) / slope.sum())
+    before = nodal_water(near, 0.0, phi, t.parts, len(phi))
+    start = float(before.sum())
+    shifted, held = phi, before
+    if abs(target - start) > tolerance and slope.sum() > 0.0:
+        uniform = np.full(len(band), abs(target - start) / slope.sum())
         for way in (np.abs(psi) + EVERYWHERE * uniform, uniform):
-            shifted, held = _along(t, near, (shifted, held), (band, slope, way), target, tolerance, spacing)
-            volume = float(held.sum())
-            if abs(target - volume) <= tolerance:
+            shifted, held = _along(t, near, (phi, before), (band, slope, way), target, tolerance, spacing)
+            if abs(target - float(held.sum())) <= tolerance:
                 break
+    moved_volume = float(held.sum()) - start
     if drain_films(shifted, spacing):
         held = nodal_water(near, 0.0, shifted, t.parts, len(phi))
-    return shifted, held, volume - start
+    return shifted, held, moved_volume
 
 
 def _along(t, near, state, moved, target, tolerance, spacing):

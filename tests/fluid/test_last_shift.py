@@ -1,0 +1,56 @@
+"""The last shift of the surface, which brings the total volume of the water to what is conserved."""
+
+import numpy as np
+import pytest
+
+from fluid.surface.volume import VOLUME_TOLERANCE, correct_volume, nodal_volume
+from tests.fluid.scenes import tank
+
+LEVEL = 0.5
+
+
+def corrected(lacks, total):
+    """φ (N,) and shift of a pool whose nodes on the side x < 0.3 lack a share of what they hold beside the surface, the
+    water being a share `total` of it more in all."""
+    water = tank([2, 0.2, 1], 0.1, lambda x: x[:, 2] - LEVEL - 0.02)
+    t, phi = water.topology, water.level_set
+    own = nodal_volume(t, phi)
+    carried = own.copy()
+    there = (t.nodes[:, 0] < 0.3) & (np.abs(phi) < 0.1)
+    carried[there] *= 1.0 + lacks
+    target = (1.0 + total) * carried.sum()
+    found = correct_volume(
+        t, water.graph_for(water.listed), water.listed, phi, carried, target, 1.0, t.node_size
+    )
+    return t.nodes[:, 0], phi, found, target
+
+
+def lowered(x, phi, found, where):
+    near = np.abs(phi) < 0.1
+    return np.abs(found.level_set - phi)[near & where(x)].max()
+
+
+def test_what_the_total_misses_comes_from_where_the_surface_was_corrected():
+    """A thousandth of the water, beside a correction at one end of the pool: by one length on all of the surface, its
+    other end would sink by half a millimetre."""
+    x, phi, found, target = corrected(0.3, -1e-3)
+    assert found.nodal_water.sum() == pytest.approx(target, rel=2 * VOLUME_TOLERANCE)
+    assert found.reinserted != 0.0
+    assert lowered(x, phi, found, lambda x: x < 0.2) > 5e-3
+    assert lowered(x, phi, found, lambda x: x > 1.5) < 1e-4
+
+
+def test_where_nothing_was_corrected_the_surface_moves_alike():
+    _, phi, found, target = corrected(0.0, 1e-3)
+    assert found.nodal_water.sum() == pytest.approx(target, rel=2 * VOLUME_TOLERANCE)
+    moved = (found.level_set - phi)[np.abs(phi) < 0.1]
+    np.testing.assert_allclose(moved, moved.mean(), rtol=1e-6)
+    assert moved.mean() == pytest.approx(-1e-3 * (LEVEL + 0.02), rel=0.02)
+
+
+def test_more_than_a_corrected_place_can_take_goes_to_all_of_the_surface():
+    """One hundredth of the water is 5 mm of all of the surface; the end that was corrected may take 10 mm more, a tenth
+    of a cell."""
+    x, phi, found, target = corrected(0.3, 1e-2)
+    assert found.nodal_water.sum() == pytest.approx(target, rel=2 * VOLUME_TOLERANCE)
+    assert lowered(x, phi, found, lambda x: x > 1.5) == pytest.approx(5e-3, rel=0.5)
