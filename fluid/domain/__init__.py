@@ -4,6 +4,7 @@ covers, continued_nodes         unknowns for each connected part of a star; the 
 physical_domain                 cells, moments and wetted surface, made from the cut
 topology                        the connectivity of nodes and cells, laid out for the kernels of a step
 layers                          layers of nodes around others
+open_columns                    what solids leave of the columns of water
 cell_vectors                    vectors of those cells that have one, as a list
 moments, quadrature             volumes of water below a linear level set; points and weights in cut cells
 hats                            the linear functions of a cell at points in it
