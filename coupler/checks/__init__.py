@@ -3,6 +3,7 @@
 read_case                                    from a case directory to a checked case
 case                                         sections that need each other, names that must exist
 places, motion, joints, softness, water      bodies, prescribed motions, joints, contacts, walls and inflows
+gauges                                       gauges: places, and what they would read
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
 tables                                       results that would be written to one place
 unit_slips                                   values for which most likely another unit was meant

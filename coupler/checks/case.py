@@ -18,6 +18,7 @@ from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath, Problem
 from coupler.case.verdict import Verdict
 from coupler.checks.air import air_problems
+from coupler.checks.gauges import gauge_problems, gauge_remarks
 from coupler.checks.joints import joint_problems, pair_problems, uplift_problems
 from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
@@ -50,7 +51,7 @@ def problems(case: Case) -> list[Problem]:
     shapes = [*_shapes(case), *opening_problems(case)]
     parts, refused = _made(case, {path[:3] for path, _ in shapes})
     found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
-    found += [*_law(case), *place_problems(case, parts), *table_problems(case)]
+    found += [*_law(case), *place_problems(case, parts), *gauge_problems(case, parts), *table_problems(case)]
     found += pair_problems(case, parts)
     found += air_problems(case, [block.name for part in parts for block in part.blocks])
     if case.structure is not None:
@@ -87,9 +88,7 @@ def remarks(case: Case) -> list[str]:
     return [
         *found,
         *unit_remarks(case),
-        *_window_remarks(case),
-        *_patch_remarks(case),
-        *_reaction_remarks(case),
+        *gauge_remarks(case),
     ]
 
 
@@ -235,53 +234,6 @@ def _pass_remarks(case: Case) -> Iterator[str]:
             "can grow, and limits.energy_error may end the run; leave coupling.passes at 2, which is stable, or give "
             "a short time.step_max"
         )
-
-
-def _window_remarks(case: Case) -> Iterator[str]:
-    """Windows of impulses that begin after the end of the run."""
-    for gauge in case.gauge:
-        window = getattr(gauge, "impulse", None)
-        if window is not None and window[0] >= case.time.end:
-            yield f"gauge '{gauge.name}' begins to add up at {window[0]:g} s, after the end ({case.time.end:g} s)"
-
-
-def _reaction_remarks(case: Case) -> Iterator[str]:
-    """Gauges of what holds blocks of which none is held."""
-    gauges = [gauge for gauge in case.gauge if gauge.kind == "reaction"]
-    if not gauges or case.structure is None:
-        return
-    driven = {motion.block for motion in case.motion}
-    blocks = [(part.name, block) for part in parts_of(case) for block in part.blocks]
-    for gauge in gauges:
-        named = [block for part, block in blocks if gauge.on in (part, block.group, block.name)]
-        if named and not any(block.fixed or block.name in driven for block in named):
-            yield (
-                f"gauge '{gauge.name}' measures what holds '{gauge.on}', and nothing does, so that it reads 0: give it "
-                "fixed = true or a [[motion]], or take a gauge of kind force for the force of the water"
-            )
-
-
-def _patch_remarks(case: Case) -> Iterator[str]:
-    """Patches for a flow of which a large part lies outside the tank, as if `at` were a corner."""
-    if case.tank is None:
-        return
-    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
-    along = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    for gauge in case.gauge:
-        if gauge.kind != "flux":
-            continue
-        points = np.asarray(gauge.at) + along @ np.asarray(gauge.edges)
-        outside = ((points < case.tank.lower) | (points > case.tank.upper)).any(axis=1).mean()
-        if outside > MUCH_OUTSIDE:
-            yield (
-                f"{100.0 * outside:.0f} % of the patch of gauge '{gauge.name}' lies outside the tank, where nothing "
-                f"flows; its key at is the centre of the patch, not a corner"
-            )
-
-
-SAMPLES, MUCH_OUTSIDE = 64, 0.4
-"""Points along an edge of a patch at which its place is looked up, and the share of it outside the tank from which on
-this is said: a patch that is larger than the opening it measures is common, one that is half outside is not."""
 
 
 # ---------------------------------------------------------------- sections

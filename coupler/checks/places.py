@@ -1,4 +1,4 @@
-"""Checks of the positions of bodies, fills and gauges. Every check yields (key path, message)."""
+"""Checks of the positions of bodies and fills. Every check yields (key path, message)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
 from coupler.geometry.start_surfaces import surface_of
-from coupler.geometry.tank_mesh import beside_mesh, is_basin, is_measured, mesh_of, tank_places, what_of
+from coupler.geometry.tank_mesh import is_basin, is_measured, mesh_of, tank_places
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.geometry.terrain.grid import TerrainError
-from coupler.results.gauges import patch_points
 
 Placed = tuple[KeyPath, str, Body]
 
@@ -57,7 +56,7 @@ def frame_problems(case: Case) -> Iterator[Problem]:
         if body.rotation is not None and not np.any(body.rotation.axis):
             yield (*path, "rotation", "axis"), "[0, 0, 0] is not a direction; write for instance [0, 0, 1]"
     if case.tank is not None and is_measured(case.tank):
-        yield from _corners_in_order(("tank",), case.tank)
+        yield from corners_in_order(("tank",), case.tank)
 
 
 def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
@@ -70,11 +69,10 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     yield from _overlaps(solids, blocks, [b.name for part in parts for b in part.blocks])
     yield from _outside(case, solids, blocks, [b.name for part in parts for b in part.blocks])
     yield from _submerged_fills(case, [*solids, *blocks])
-    held = [(part.path, b.name, Body.of_block(b)) for part in parts for b in part.blocks if b.fixed]
-    yield from _gauges(case, [*solids, *held])
 
 
-def _corners_in_order(path: KeyPath, box) -> Iterator[Problem]:
+def corners_in_order(path: KeyPath, box) -> Iterator[Problem]:
+    """Boxes whose upper corner is not above the lower one; path: of the section with both."""
     for axis, low, high in zip("xyz", box.lower, box.upper):
         if low >= high:
             yield (*path, "upper"), f"{axis}: upper ({high:g} m) must be greater than lower ({low:g} m)"
@@ -117,7 +115,7 @@ def _memory(case: Case) -> Iterator[Problem]:
 def _fills(case: Case) -> Iterator[Problem]:
     for i, fill in enumerate(case.water.fill if case.water else ()):
         path = ("water", "fill", i)
-        disorder = list(_corners_in_order(path, fill))
+        disorder = list(corners_in_order(path, fill))
         yield from disorder
         if not disorder:
             yield from _start_surface(case, path, fill)
@@ -309,105 +307,3 @@ def _hollow(path: KeyPath, building: Building) -> Iterator[Problem]:
             (*path, "storeys"),
             f"storeys of {building.size[2] / building.storeys:.4g} m have no room above floors of {floor:g} m",
         )
-
-
-def _gauges(case: Case, held: list[Placed]) -> Iterator[Problem]:
-    for i, gauge in enumerate(case.gauge):
-        path = ("gauge", i)
-        window = getattr(gauge, "impulse", None)
-        if window is not None and window[0] >= window[1]:
-            yield (
-                (*path, "impulse"),
-                f"from {window[0]:g} s to {window[1]:g} s: the end must come after the start",
-            )
-        if gauge.kind == "loads" and gauge.every is not None and not gauge.each_block:
-            yield (*path, "every"), "is for the rows of each block; add each_block = true"
-        if gauge.kind not in ("motion", "reaction", "loads") and case.water is None:
-            yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
-        elif gauge.kind == "reaction" and case.structure is None:
-            yield (
-                (*path, "kind"),
-                f"'{gauge.name}' measures what holds blocks, and there is no section [structure]; of a fixed solid "
-                "take a gauge of kind force or loads",
-            )
-        elif gauge.kind == "volume":
-            yield from _volume(case, path, gauge)
-        elif (
-            gauge.kind in ("level", "pressure", "patch", "air", "velocity", "flux") and case.tank is not None
-        ):
-            placed = list(_gauge_place(case, path, gauge, held))
-            shapeless = list(_patch(path, gauge))
-            yield from placed
-            yield from shapeless
-            if gauge.kind == "patch" and not placed and not shapeless:
-                yield from _patch_in_tank(case, path, gauge)
-
-
-def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
-    """Patches without a shape or an area, and windows without a length."""
-    if gauge.kind == "patch" and (gauge.edges is None) == (gauge.radius is None):
-        yield path, f"'{gauge.name}' needs either edges (a parallelogram) or radius and normal (a disc)"
-    elif gauge.kind == "patch" and gauge.radius is not None and not np.any(gauge.normal or 0.0):
-        yield (*path, "normal"), f"'{gauge.name}' is a disc and needs a normal, for instance [-1, 0, 0]"
-    edges = getattr(gauge, "edges", None)
-    if edges is not None and not np.any(np.cross(*edges)):
-        yield (*path, "edges"), f"the edges of '{gauge.name}' are parallel: the patch has no area"
-
-
-def _patch_in_tank(case: Case, path: KeyPath, gauge) -> Iterator[Problem]:
-    """Patches that reach out of the tank, where no water can be asked for its pressure."""
-    points = patch_points(gauge)
-    if case.tank.is_box:
-        slack = 1e-10 * case.tank.cell  # as far as cells are found
-        outside = (points < np.subtract(case.tank.lower, slack)) | (points > np.add(case.tank.upper, slack))
-        beyond = outside.any(axis=1)
-    else:
-        beyond = mesh_of(case.tank).locate(points) < 0
-    if beyond.any():
-        x, y, z = points[np.argmax(beyond)]
-        yield (
-            path,
-            f"'{gauge.name}' reaches out of the tank: no cell is at ({x:.4g}, {y:.4g}, {z:.4g}) m; make the patch "
-            "smaller, or move it inside",
-        )
-
-
-def _volume(case: Case, path: KeyPath, gauge) -> Iterator[Problem]:
-    """Boxes of volume gauges with corners in the wrong order, or wholly beside the tank."""
-    disorder = list(_corners_in_order(path, gauge))
-    yield from disorder
-    for axis, low, high in (
-        zip("xyz", gauge.lower, gauge.upper) if case.tank is not None and not disorder else ()
-    ):
-        low_end, high_end = case.tank.lower["xyz".index(axis)], case.tank.upper["xyz".index(axis)]
-        if high <= low_end or low >= high_end:
-            yield (
-                path,
-                f"'{gauge.name}' lies beside the tank: {axis} from {low:g} to {high:g} m, the tank from {low_end:g} to "
-                f"{high_end:g} m",
-            )
-            return
-
-
-def _gauge_place(case: Case, path: KeyPath, gauge, held: list[Placed]) -> Iterator[Problem]:
-    for axis, value in enumerate(gauge.at):
-        low, high = case.tank.lower[axis], case.tank.upper[axis]
-        if not low <= value <= high:
-            yield (
-                (*path, "at"),
-                f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
-            )
-            return
-    if not case.tank.is_box and gauge.kind != "flux" and beside_mesh(case.tank, gauge.at):
-        yield (
-            (*path, "at"),
-            f"'{gauge.name}' is outside {what_of(case.tank)}: no cell is there; move it inside",
-        )
-    if len(gauge.at) == 3 and gauge.kind != "flux":
-        for _, name, body in held:
-            (depth,) = body.depth(np.array([gauge.at]))
-            if depth > TOUCH * body.thickness():
-                yield (
-                    (*path, "at"),
-                    f"'{gauge.name}' lies {depth:.3g} m inside '{name}'; put it on the face",
-                )

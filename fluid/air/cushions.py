@@ -11,9 +11,10 @@ and its pressure over the step is that of its gas (`gas.py`) in the middle of it
     X_k + known_k = P(V' + dt R^n/2) + dt S ((R_k - R^n)/4 + (θ_k - 1/2) R_k),        S = -dP/dV there,         (2)
 
 with V' the volume above the surface as the step has already moved it, and with the bodies where their last velocity
-takes them.  The surface moves with R^n + (R^n - R^{n-1})/2, so that V' + dt R^n/2 advances by dt R^n from step to step:
-leapfrog, which with 1/4 is neutral at any ratio of the step and the period.  (P taken from V^n, before the surface
-moved, drove every cushion that fewer than some 24 steps a period resolve, to three to thirty times its energy.)
+takes them.  In equal steps the surface moves with R^n + (R^n - R^{n-1})/2, so that V' + dt R^n/2 advances by dt R^n
+from step to step: leapfrog, which with 1/4 is neutral at any ratio of the step and the period.  (P taken from V^n,
+before the surface moved, drove every cushion that fewer than some 24 steps a period resolve, to three to thirty times
+its energy.)
 
 With γ_k = θ_k - 1/4 and C = 1/(γ_k S dt) this is a row like all others, symmetric and positive; the pressure of
 the pocket enters it at the crossing of every edge to its nodes as zero does where the air is open:

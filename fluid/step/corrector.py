@@ -305,7 +305,6 @@ def _flux(water, kept, listed, start, u, gradient, dt):
         dt=dt if water.parameters.theta < 1.0 else 0.0,
         water=less(kept.nodal_water, kept.displaced),
         capacity=t.node_volume,
-        room=t.room,
     )
     return field, ahead
 

@@ -112,7 +112,6 @@ def restore(water, domain, arrays) -> None:
         dt=float(arrays["flux_dt"]),
         water=water.nodal_water - water.displaced,
         capacity=water.topology.node_volume,
-        room=water.topology.room,
     )
     if water.sides is not None:
         for name in SIDES:

@@ -194,7 +194,6 @@ class Water:
             dt=0.0,
             water=self.nodal_water,
             capacity=t.node_volume,
-            room=t.room,
         )
 
     def _start_moving(self, velocity) -> None:

@@ -86,7 +86,8 @@ class Flux:
 class FluxAhead:
     """What the flux of a step is made of once its length is known: the listed nodes (n,) with their graph; now:
     velocity of the cells around them when the last step ended, before (k, 3) [m/s]: at its beginning, or now where no
-    velocity was; dt [s]: its length, 0 where the flux lies ahead of nothing; water, capacity and room of `Flux`."""
+    velocity was; dt [s]: its length, 0 where the flux lies ahead of nothing; water and capacity of `Flux`, the latter
+    to tell the domain that they belong to."""
 
     nodes: Ints
     graph: Graph
@@ -95,7 +96,6 @@ class FluxAhead:
     dt: float
     water: Floats
     capacity: Floats
-    room: Floats
 
     def over(self, topology, dt: float) -> Flux:
         """The flux half of a step of dt [s] ahead, on the topology that the velocity belongs to. Its change in the last
