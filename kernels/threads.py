@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
-from kernels.decorators import kernel, ranged, released
+from kernels.decorators import inner, kernel, ranged, released
 from kernels.memory import OWN
 from kernels.ranges import MOST, is_shared
 from kernels.team import Team
@@ -142,6 +142,16 @@ def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args, wei
     ends, runs, cuts = reach().divided(nodes, parts, count)
     if not _team.share_runs(kernel, ends, runs, cuts, args):
         kernel(0, nodes, np.array([[0, count]]), *args)
+
+
+@inner
+def owns_any(first, last, cells, e):
+    """Whether a node of cell e is in a range: asked first by kernels of `owning` that take long for a cell, since a
+    list of few cells, those that hold the surface, has runs that reach everywhere."""
+    some = False
+    for a in range(4):
+        some = some or first <= cells[e, a] < last
+    return some
 
 
 def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from array_types import Floats, Integers
 from kernels.decorators import inner, kernel, plain, released
-from kernels.threads import found_over, over, owning, reach_of_cells
+from kernels.threads import found_over, over, owning, owns_any, reach_of_cells
 
 
 @inner
@@ -144,7 +144,7 @@ def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
                 for a in range(4):
                     if first <= cells[e, a] < last:
                         water[cells[e, a]] += volume[e] * share[share_row[e], a]
-            elif n_wet > 0:
+            elif n_wet > 0 and owns_any(first, last, cells, e):
                 part_moments(e, at, parts, total, local, out)
                 for a in range(4):
                     if first <= cells[e, a] < last:

@@ -96,23 +96,30 @@ def _surface_of(domain):
 def _differences(first, last, at, in_coupling, surface, fields, found):
     """found (k, 6): force and moment of (2) on the listed triangles, of which the first `in_coupling` are in G."""
     (polygons, corners), hats, nodes, centre = surface
+    cell, body, areas, normal, cells = (
+        polygons.cell,
+        polygons.body,
+        polygons.area,
+        polygons.normal,
+        hats.cells,
+    )
     phi, ghosts, p, outside, solved = fields
     hat, arm = np.empty(4), np.empty((3, 3))
     height, full, acting = np.empty(3), np.empty(3), np.empty(3)
-    share, room, mean = np.empty((2, 3, 3)), np.empty((4, 3)), np.empty(4)
+    work, mean = (np.empty((2, 3, 3)), np.empty((4, 3))), np.empty(4)
     for s in range(first, last):
         row = at[s]
-        e, b, area, n = polygons.cell[row], polygons.body[row], polygons.area[row], polygons.normal[row]
+        e, b, area = cell[row], body[row], areas[row]
         above = 0.0  # the pressure of the air, if there is any
         for a in range(4):
-            there = outside[hats.cells[e, a]]
+            there = outside[cells[e, a]]
             if abs(there) > abs(above):
                 above = there
         for q in range(3):
             hats_at(e, corners[row, q], hats, nodes, hat)
             height[q] = full[q] = acting[q] = 0.0
             for a in range(4):
-                i = hats.cells[e, a]
+                i = cells[e, a]
                 height[q] += hat[a] * phi[i]
                 full[q] += hat[a] * (ghosts[i] - above)
                 if solved[i] and s < in_coupling:
@@ -123,12 +130,12 @@ def _differences(first, last, at, in_coupling, surface, fields, found):
             mean[c] = 0.0
         if acting[0] != 0.0 or acting[1] != 0.0 or acting[2] != 0.0:
             add_over_whole(1.0, area, acting, arm, mean)
-        add_over_wet(-1.0, area, height, full, arm, (share, room), mean)
+        add_over_wet(-1.0, area, height, full, arm, work, mean)
         for c in range(3):
-            found[s, c] = mean[0] * n[c]
-        found[s, 3] = mean[2] * n[2] - mean[3] * n[1]
-        found[s, 4] = mean[3] * n[0] - mean[1] * n[2]
-        found[s, 5] = mean[1] * n[1] - mean[2] * n[0]
+            found[s, c] = mean[0] * normal[row, c]
+        found[s, 3] = mean[2] * normal[row, 2] - mean[3] * normal[row, 1]
+        found[s, 4] = mean[3] * normal[row, 0] - mean[1] * normal[row, 2]
+        found[s, 5] = mean[1] * normal[row, 1] - mean[2] * normal[row, 0]
 
 
 def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
