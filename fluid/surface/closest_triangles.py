@@ -285,12 +285,14 @@ def _descend_all(first, last, descending, order, place, surface, boxes, near, me
 
 @inner
 def _above(p, t, square):
-    """Whether the squared distance [m²] of the point p (3,) from the triangle t (3, 3) is that from its plane."""
+    """Whether the squared distance [m²] of the point p (3,) from the triangle t (3, 3) is that from its plane; one
+    without area has none."""
     abx, aby, abz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
     acx, acy, acz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
     nx, ny, nz = aby * acz - abz * acy, abz * acx - abx * acz, abx * acy - aby * acx
     height = (p[0] - t[0, 0]) * nx + (p[1] - t[0, 1]) * ny + (p[2] - t[0, 2]) * nz
-    return square * (nx * nx + ny * ny + nz * nz) <= (1.0 + BESIDE) * height * height
+    area = nx * nx + ny * ny + nz * nz
+    return area > 0.0 and square * area <= (1.0 + BESIDE) * height * height
 
 
 @inlined
