@@ -29,7 +29,7 @@ from fluid.pressure.projection import (
     with_ghosts,
 )
 from fluid.step.momentum import Stages, holding_water, momentum_change
-from fluid.step.remainders import MEMORY_DEPTH, left_in_cells
+from fluid.step.remainders import LAYER, MEMORY_DEPTH, left_in_cells
 from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
@@ -41,7 +41,7 @@ FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
 HELD = 0.02
 """Share of what a node above the surface can hold from which water around jumps keeps its own momentum in full."""
-WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
+WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0 - LAYER
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
 would take what is real."""
@@ -52,7 +52,7 @@ motion over several cells grows by 0.034 a step without, by 0.008 with 0.5 once,
 AT_REST = (0.002, 0.01)
 """Speeds in √(g h) between which the damping along water lines on slanting sides of the mesh, a bed, ends: at full
 strength it takes a tenth of the run-up of a wave (P42), and what is to be kept still is far slower."""
-KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0, 0.025
+KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0 - LAYER, 0.025
 """On meshes with obtuse cells, in calm water: c of `damp_gradient_jumps` and how far below the surface it acts (cells
 of the surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for partly wet cells."""
 

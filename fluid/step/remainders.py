@@ -16,7 +16,10 @@ from fluid.domain.cell_vectors import CellVectors, first_from
 from kernels.decorators import inner, ranged
 from kernels.threads import over
 
-MEMORY_DEPTH = 2.0
+LAYER = 1e-6
+"""What limits of depth, in cell sizes, lack of whole numbers, so that no layer of nodes under level water that ends at
+such a layer lies on one: round-off would decide for each cell."""
+MEMORY_DEPTH = 2.0 - LAYER
 """Cells nearer to the surface than this, in cell sizes, keep nothing in calm water: there it feeds surface noise."""
 FAST = (1.0, 3.0)
 """Speeds in √(g h) of a cell near the surface from the first of which it keeps a part of the share of
