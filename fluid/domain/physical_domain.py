@@ -38,9 +38,8 @@ from kernels.decorators import kernel
 
 __all__ = ["PhysicalDomain", "carry", "cut_domain", "wetted_coupling"]
 
-# One absolute tolerance for the whole mesh, as a share of its spacing; the search takes ten times that.
-TOLERANCE = 1e-10
-SEARCH_MARGIN = 1e-9
+# Tolerances of the mesh within which bodies and cells are near.
+SEARCH_MARGIN = 10.0
 # Entries of the second moments in the order of the kernel.
 XX = np.array([0, 1, 2, 0, 0, 1])
 YY = np.array([0, 1, 2, 1, 2, 2])
@@ -250,7 +249,7 @@ def _remembered(mesh, bodies, covers, previous, connection):
 
 def _cut_all(mesh, bodies, covers, connection):
     every = np.arange(len(bodies))
-    cell, body = near_pairs(mesh, bodies, every, SEARCH_MARGIN * mesh.spacing)
+    cell, body = near_pairs(mesh, bodies, every, SEARCH_MARGIN * mesh.tolerance)
     cuts = _cut_pairs(mesh, bodies, cell, body, covers, connection)
     return Memory(
         mesh=mesh,
@@ -270,7 +269,7 @@ def _cut_moved(memory, bodies, moved, covers):
     if memory.connection.spares > 0.0:
         moved = _with_neighbours(memory.bodies, moved, memory) | _with_neighbours(bodies, moved, memory)
     gone = moved[memory.pair_body]
-    new_cell, new_body = near_pairs(mesh, bodies, np.flatnonzero(moved), SEARCH_MARGIN * mesh.spacing)
+    new_cell, new_body = near_pairs(mesh, bodies, np.flatnonzero(moved), SEARCH_MARGIN * mesh.tolerance)
     touched = np.zeros(len(mesh.cells), dtype=bool)
     touched[memory.pair_cell[gone]] = True
     touched[new_cell] = True
@@ -288,11 +287,10 @@ def _cut_pairs(mesh, bodies, cell, body, covers, connection):
     chosen, first = np.unique(cell, return_index=True)
     start = np.append(first, len(cell)).astype(np.int64)
     link_area = -1.0 if covers == "single" else connection.link_area(mesh.local_size[chosen])
-    tolerance = TOLERANCE * mesh.spacing
 
     def cut(chosen, start, body, link_area):
         return cut_cells(
-            mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area
+            mesh.nodes, mesh.cells, chosen, start, body, bodies, mesh.tolerance, mesh.spacing, link_area
         )
 
     cuts = cut(chosen, start, body, link_area)

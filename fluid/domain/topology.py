@@ -229,16 +229,18 @@ def covered_nodes(domain) -> Array:
     """(N,) bool: nodes that lie, for at least one body, behind all wetted polygons of that body in the cells around
     them.
 
-    A body is convex, so a node with all of its nearby faces in front of it lies inside."""
+    A body is convex, so a node with all of its nearby faces in front of it lies inside. A node in the plane of a face
+    is in front of it; the face bends by as much as nodes are moved into it."""
     d = domain
     if len(d.face_cell) == 0:
         return np.zeros(len(d.nodes), bool)
     start, members = polygons_of_nodes(d.face_cell, d.cells, len(d.nodes))
-    return _covered(start, members, d.nodes, d.face_body, d.face_centroid, d.face_normal, d.n_bodies)
+    surface, least = (d.face_body, d.face_centroid, d.face_normal), 2.0 * d.memory.mesh.tolerance
+    return _covered(start, members, d.nodes, *surface, d.n_bodies, least)
 
 
 @kernel
-def _covered(start, members, nodes, body, centroid, normal, n_bodies):
+def _covered(start, members, nodes, body, centroid, normal, n_bodies, least):
     covered = np.zeros(len(nodes), np.bool_)
     # marks of the current node: bodies met so far, and bodies with a face that the node is in front of
     seen, in_front = np.full(n_bodies, -1, np.int64), np.full(n_bodies, -1, np.int64)
@@ -253,7 +255,7 @@ def _covered(start, members, nodes, body, centroid, normal, n_bodies):
             height = 0.0
             for c in range(3):
                 height += (nodes[i, c] - centroid[s, c]) * normal[s, c]
-            if height >= -1e-12 and in_front[b] != i:
+            if height >= -least and in_front[b] != i:
                 in_front[b] = i
                 behind -= 1
         covered[i] = behind > 0

@@ -36,6 +36,8 @@ MOST_SLENDER = 2.5
 edges."""
 SAME_SIZE = 1e-9
 """Difference of sizes over the spacing that counts as round-off."""
+IN_PLANE, ROUND_OFF = 1e-10, 16.0 * float(np.finfo(float).eps)
+"""Shares of the spacing and of the largest coordinate in `Background.tolerance`."""
 ALONG = 1e-9
 """Largest 1 - |n·e| of a face that counts as normal to an axis: round-off."""
 STEEPEST_BED = 1.0
@@ -120,6 +122,13 @@ class Background:
     def bounds(self) -> Array:
         """(2, 3) [m] lowest and highest coordinates."""
         return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
+
+    @cached_property
+    def tolerance(self) -> float:
+        """Distance [m] from a plane within which a node lies in it: a share of the spacing, and at least what round-off
+        makes of it at the node farthest from zero. At map coordinates, millions of metres, that is more where cells
+        are small."""
+        return max(IN_PLANE * self.spacing, ROUND_OFF * float(np.abs(self.bounds).max()))
 
     @cached_property
     def cell_size(self) -> Array:

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain, wetted_coupling
+from fluid.domain.topology import covered_nodes
 from fluid.mesh.background import box_mesh
 from fluid.mesh.gradients import gradients
 
@@ -171,3 +172,23 @@ def test_flush_faces_that_cross_at_any_angle_lose_none(exponent):
         centre = [at, 0.5, level] - np.einsum("bij,bj->bi", turn, arm) + 8e-4 * arm
         bodies = ConvexBodies.boxes(centre, [[thick, 0.9, 1.0]] * 2, turn)
         assert divergence_defect(cut_domain(MESH, bodies)) < 1e-9
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 4, 0.3])
+def test_stones_that_touch_at_map_coordinates_have_no_water_between_them(angle):
+    """Loose courses of a wall in a mesh of 0.1 m, at zero and 4000 km north, where coordinates have steps of half a
+    nanometre: with a tolerance of 1e-10 cells the surface was too large by up to 73 % there, all of it in the joints,
+    and others of the nodes counted as covered."""
+    at = np.stack(np.meshgrid(np.arange(3), np.arange(2), np.arange(3), indexing="ij"), -1).reshape(-1, 3)
+    turn = Rotation.from_euler("z", angle).as_matrix()
+    found = []
+    for place in (np.zeros(3), np.array([5e5, 4e6, 12.0])):
+        mesh = box_mesh(place, place + 1.0, 0.1)
+        for seed in range(10):
+            stones = at[np.random.default_rng(seed).random(len(at)) < 0.7]
+            size = np.tile([0.2, 0.1, 0.15], (len(stones), 1))
+            centre = place + [0.5, 0.5, 0.4] + (stones - 1.0) * size @ turn.T
+            domain = cut_domain(mesh, ConvexBodies.boxes(centre, size, np.tile(turn, (len(stones), 1, 1))))
+            found.append([domain.face_area.sum(), domain.volume.sum(), covered_nodes(domain).sum()])
+    at_zero, far_away = np.split(np.array(found), 2)
+    np.testing.assert_allclose(far_away, at_zero, rtol=1e-7)

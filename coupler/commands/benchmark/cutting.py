@@ -71,21 +71,18 @@ def search(mesh, bodies):
     from fluid.cut.candidate_pairs import near_pairs
     from fluid.domain.physical_domain import SEARCH_MARGIN
 
-    return near_pairs(mesh, bodies, np.arange(len(bodies)), SEARCH_MARGIN * mesh.spacing)
+    return near_pairs(mesh, bodies, np.arange(len(bodies)), SEARCH_MARGIN * mesh.tolerance)
 
 
 def cut(mesh, bodies, cell, body):
     """Cuts of the cells in the pairs, with the parts that multiple covers need."""
     from fluid.cut.cut_cells import cut_cells
     from fluid.domain.covers import Connection
-    from fluid.domain.physical_domain import TOLERANCE
 
     chosen, first = np.unique(cell, return_index=True)
     start = np.append(first, len(cell)).astype(np.int64)
     area = Connection().link_area(mesh.spacing)
-    return cut_cells(
-        mesh.nodes, mesh.cells, chosen, start, body, bodies, TOLERANCE * mesh.spacing, mesh.spacing, area
-    )
+    return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, mesh.tolerance, mesh.spacing, area)
 
 
 def cut_cells(cuts) -> int:
