@@ -54,3 +54,20 @@ def test_more_than_a_corrected_place_can_take_goes_to_all_of_the_surface():
     x, phi, found, target = corrected(0.3, 1e-2)
     assert found.nodal_water.sum() == pytest.approx(target, rel=2 * VOLUME_TOLERANCE)
     assert lowered(x, phi, found, lambda x: x > 1.5) == pytest.approx(5e-3, rel=0.5)
+
+
+@pytest.mark.parametrize("lacks", [0.02, 0.1])
+def test_a_pool_that_lacks_nothing_is_left_alone(lacks):
+    """Two columns of water on one floor, one of which holds less than its surface says: with one length for both, the
+    other would sink by a tenth of what the first does; by as much where that takes more than a tenth of a cell."""
+    water = tank([2, 0.2, 1], 0.1, lambda x: np.maximum(x[:, 2] - LEVEL - 0.02, 0.37 - np.abs(x[:, 0] - 1.0)))
+    t, phi = water.topology, water.level_set
+    carried = nodal_volume(t, phi)
+    left = t.nodes[:, 0] < 1.0
+    carried[left] *= 1.0 - lacks
+    found = correct_volume(
+        t, water.graph_for(water.listed), water.listed, phi, carried, carried.sum(), 1.0, t.node_size
+    )
+    assert found.nodal_water.sum() == pytest.approx(carried.sum(), rel=2 * VOLUME_TOLERANCE)
+    assert found.reinserted != 0.0
+    np.testing.assert_allclose(found.nodal_water[~left].sum(), carried[~left].sum(), rtol=1e-12)
