@@ -46,10 +46,11 @@ class Schedule:
         return replace(self, end=end)
 
     def next_output(self, time: float) -> float:
-        """The first output after a time [s]."""
-        k = _intervals(time, self.interval) + 1
-        target = self.span * k / self.count
-        return target if target < self.end * (1.0 - ROUNDING) else self.end
+        """The first output after a time [s]. An end that is one of them but for rounding is that very number, 3 x 0.1 s
+        and not 0.3 s, so that a run that goes on beyond it takes the steps of one with the later end."""
+        whole, part = divmod(_intervals(time, self.interval) + 1, self.count)
+        target = self.span * whole + self.span * part / self.count
+        return target if target < self.end * (1.0 + ROUNDING) else self.end
 
 
 def checkpoint_interval(case: Case) -> float:

@@ -34,6 +34,15 @@ def test_a_longer_end_keeps_the_interval():
     assert schedule.next_output(1.4999) == 1.5
 
 
+@pytest.mark.parametrize("every", [0.1, 0.01, 0.007])
+def test_a_run_that_is_extended_ends_first_at_an_output_of_the_longer_one(every):
+    """3 x 0.1 s is 4e-17 s more than 0.3 s: the step after it had another last digit."""
+    longer = Schedule.of(timed(end=100 * every, output_every=every))
+    for k in range(1, 100):
+        first = Schedule.of(timed(end=round(k * every, 3), output_every=every))
+        assert first.next_output((k - 0.5) * every) == longer.next_output((k - 0.5) * every)
+
+
 def test_the_interval_divides_the_first_end():
     assert Schedule.of(timed(end=1.0, output_every=0.3)) == Schedule(1.0, 3, 1.0)
     assert Schedule.of(timed(end=1.0, output_every=5.0)) == Schedule(1.0, 1, 1.0)
