@@ -6,8 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.case import Case
 from coupler.geometry.parts import Part, parts_of
+from coupler.geometry.solid_ground import raised_by
+from coupler.geometry.solids import obstacle_blocks
+from coupler.geometry.tank_mesh import bed_under, mesh_of
 
 STANDING = ("wall", "building", "column", "arch", "town")
 """Parts whose lower blocks carry those above."""
@@ -17,19 +21,19 @@ def softness_remarks(case: Case) -> Iterator[str]:
     """The block with the largest overlap relative to its thickness, if that is beyond `limits.overlap`.
 
     A weight W overlaps by W/K, and a mass m that lands with the speed v by v sqrt(m/K). The speed v is that at the
-    start and of the free fall to the ground or the floor of the tank."""
+    start and of the free fall to what lies below."""
     if case.structure is None or case.contact is None:
         return
-    worst, limit = None, case.limits.overlap
-    for part in parts_of(case):
+    worst, limit, parts = None, case.limits.overlap, parts_of(case)
+    falls = _falls(case, parts)
+    for part in parts:
         above = _carried(part)
         for block in part.blocks:
             K = _stiffness(case, block)
             if block.fixed or K is None:
                 continue
-            speed = float(
-                np.sqrt(block.velocity @ block.velocity + 2.0 * case.case.gravity * _fall(case, part, block))
-            )
+            fallen = 2.0 * case.case.gravity * falls.get(block.name, 0.0)
+            speed = float(np.sqrt(block.velocity @ block.velocity + fallen))
             weight = above * block.mass * case.case.gravity
             thickness = 2.0 * float(block.planes[1].min())
             share = (weight / K + speed * np.sqrt(block.mass / K)) / thickness
@@ -70,10 +74,30 @@ def _stiffness(case: Case, block) -> float | None:
     return joint_parameters(j).closing_stiffness * float(areas.mean())
 
 
-def _fall(case: Case, part: Part, block) -> float:
-    """Height [m] from which a block without support falls to the ground or the floor of the tank."""
-    floors = [case.structure.ground.level] if case.structure.ground else []
-    floors += [case.tank.lower[2]] if case.tank is not None else []
-    if not floors or part.path[1] in STANDING or (case.joints is not None and part.path[1] != "rubble"):
-        return 0.0
-    return max(0.0, float(block.world_vertices()[:, 2].min()) - max(floors))
+def _falls(case: Case, parts: list[Part]) -> dict[str, float]:
+    """Heights [m] from which blocks without support fall, by their names: to the ground, the bed of the tank, or what
+    stands there below their centres, fixed solids and blocks at rest at the start."""
+    loose = [
+        block
+        for part in parts
+        if part.path[1] not in STANDING and (case.joints is None or part.path[1] == "rubble")
+        for block in part.blocks
+    ]
+    if not loose or (case.structure.ground is None and case.tank is None):
+        return {}
+    places = np.array([block.centre[:2] for block in loose])
+    bodies = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
+    found = raised_by(_bed(case, places), places, [(b.world_vertices(), b.faces) for b in bodies])
+    lowest = np.array([block.world_vertices()[:, 2].min() for block in loose])
+    return {block.name: fall for block, fall in zip(loose, np.maximum(lowest - found, 0.0).tolist())}
+
+
+def _bed(case: Case, places) -> Array:
+    """Heights z (n,) [m] of the ground or the bed of the tank, whichever is higher, at places (n, 2) [m]."""
+    tank, found = case.tank, np.full(len(places), -np.inf)
+    if tank is not None:
+        found = np.full(len(places), tank.lower[2])
+        if not tank.is_box:
+            found = np.fmax(found, bed_under(mesh_of(tank), places))
+    ground = case.structure.ground
+    return found if ground is None else np.maximum(found, ground.level)

@@ -3,15 +3,18 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.softness import softness_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode
 from coupler.scene.build import build
 from coupler.step.limits import Diverged, check_overlap
 from tests.fakes import no_clock
+from tests.physics.scenes import case
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
@@ -50,6 +53,28 @@ def test_a_soft_contact_is_remarked_and_ends_the_run(tmp_path, stiffness, soft):
         assert "'plate' is" in done.stderr
         assert "deep in the ground" in done.stderr
         assert "limits.overlap" in done.stderr
+
+
+@pytest.mark.parametrize(("quay", "fall"), [(5.0, 0.0), (2.0, 8.0)])
+def test_blocks_fall_to_what_lies_below_them(quay, fall):
+    """A crate that rests on a quay 8 m high, or lies 8 m above the floor beside it, and a stack of nine beside that:
+    the floor of the tank was where each of them would land."""
+
+    def crate(name, x, z):
+        return {"name": name, "size": [1, 1, 1], "centre": [x, 1, z]}
+
+    blocks = [crate("crate", 5, 8.5), *(crate(f"c{i}", 8, 0.5 + i) for i in range(9))]
+    found = case(
+        time={"end": 1},
+        tank={"lower": [0, 0, 0], "upper": [10, 2, 12], "cell": 0.5},
+        solid=[{"centre": [quay, 1, 4], "size": [2, 2, 8]}],
+        structure={"block": blocks, "density": 2400.0},
+        contact={"stiffness": 3e6},
+    )
+    reported = list(softness_remarks(found))
+    assert [("'crate'" in text, f"{np.sqrt(2 * 9.81 * fall):.3g} m/s" in text) for text in reported] == (
+        [(True, True)] if fall else []
+    )
 
 
 def test_crossed_edges_are_measured_by_the_way_that_parts_them():
