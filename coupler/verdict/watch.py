@@ -135,9 +135,12 @@ class Watch:
         self._before = velocity
 
     def _loads(self, coupling: CoupledStepper, record: StepRecord, in_place: Array) -> None:
-        """Force and overturning moment of the water on each body; pressure across blocks that are in their place."""
+        """Force and overturning moment of the water on each body; pressure across blocks that are in their place.
+
+        The levers of the moment are those at the start: the buoyancy of a block that is carried off would count with
+        its way, however little the water tilts it."""
         n = coupling.structure.n
-        load, centre = record.load[:n], coupling.water.domain.body_centre[:n]
+        load, centre = record.load[:n], self.facts.centre[:n]
         across = np.abs(np.einsum("ni,ni->n", load[:, :3], self.facts.across)) / self.facts.area
         self.pressure.take(np.where(in_place, across, 0.0), record.time)
         label = self.divisions.bodies.label

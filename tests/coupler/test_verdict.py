@@ -161,6 +161,18 @@ def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(s
     assert watch.impulse[0] == pytest.approx([1.5e3, 0.0, 0.0])  # 10 ms of the whole and of half
 
 
+def test_the_way_of_a_block_that_is_carried_off_is_no_overturning_moment(scene):
+    """1 kN of buoyancy on the crate 3 m off, and no moment about its own centre: nothing overturns it. About the fixed
+    middle of its foot that buoyancy had 3 kN m."""
+    s, watch, coupling = scene
+    lift = np.zeros((3, 3))
+    lift[2, 2] = 1e3
+    for way in (0.0, 3.0):
+        s.x[2, 0] += way
+        watch.step(coupling, record(0.5 + way, load=lift))
+        assert watch.moment.value[list(watch.divisions.bodies.names).index("crate")] == pytest.approx(0.0)
+
+
 def test_displaced_blocks_are_listed_from_the_farthest_on(scene):
     s, watch, coupling = scene
     s.x = s.x + np.array([[0.2, 0, 0], [0.5, 0, 0], [0, 0, 0]])
