@@ -348,6 +348,55 @@ source = "free field"
         assert [gauge.name for gauge in found.gauge] == ["front"]
 
 
+FREE_DEPTH = """
+[[sweep.vary]]
+name = "depth"
+key = "water.fill[0].upper[2]"
+values = [0.8, 1.2]
+[[sweep.quantity]]
+name = "flow"
+table = "history/gauges.csv"
+column = "front_level"
+take = "max"
+source = "free field"
+"""
+
+
+def test_the_free_field_leaves_out_all_that_is_about_the_structure(case):
+    """A verdict, cracks of joints and cells that are finer around a block: each was refused without the blocks."""
+    text = WATER.replace("[[water.fill]]", '[water]\ncracks = "slit"\n[[water.fill]]').replace(
+        "cell = 0.25",
+        """cell = 0.25
+refine = [
+    { around = ["box"], levels = 1 },
+    { around = ["pier", "box"], levels = 1 },
+    { around = ["blocks", "pier"], levels = 1 },
+]""",
+    )
+    more = """
+[joints]
+strength = 1e6
+opening_at_failure = 0.01
+[verdict]
+on = ["box"]
+[[solid]]
+name = "pier"
+centre = [3.5, 0.5, 0.25]
+size = [0.2, 0.2, 0.5]
+"""
+    plan = make_plan(case(FREE_DEPTH, text=text + more))
+    assert [row.wrong for row in plan.rows] == ["", ""]
+    found = load(plan.file.path, plan.runs[plan.rows[0].free]).case
+    assert found.structure is None
+    assert [region.around for region in found.tank.refine] == [("pier",), ("blocks", "pier")]
+
+
+def test_what_is_wrong_without_the_structure_alone_says_so(case):
+    sweep = '[sweep]\nfree_field = ["tank.cell=-1"]\n' + FREE_DEPTH
+    with pytest.raises(BadCase, match=r"tank\.cell.*in the run without structure; sweep\.free_field"):
+        make_plan(case(sweep, text=WATER))
+
+
 def test_rows_that_are_no_case_are_reported_and_the_rest_is_run(case):
     plan = make_plan(case('[[sweep.vary]]\nkey = "time.end"\nvalues = [0.01, -1]\n'))
     assert [bool(row.wrong) for row in plan.rows] == [False, True]

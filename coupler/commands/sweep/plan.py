@@ -28,9 +28,10 @@ from coupler.commands.sweep.draw import cube, distribution, quantiles, seed_of, 
 from coupler.commands.sweep.quantities import asked
 from coupler.commands.sweep.table_in import InputTable, read_table
 from coupler.commands.sweep.vary import varied
+from coupler.geometry.tank_regions import ALL
 from coupler.program.errors import BadCase, UnitError
 
-OFF = ("structure", "contact", "joints", "motion")
+OFF = ("structure", "contact", "joints", "motion", "verdict")
 """Sections that are left out of the run without structure."""
 OF_STRUCTURE = ("force", "loads", "reaction", "motion")
 """Kinds of gauges that are left out with them."""
@@ -253,7 +254,7 @@ class _Planner:
             overrides += tuple(self._linked(values, overrides))
             id = self._add((*self.sweep.set, *overrides))
             if self.needs_free:
-                free = self._add((*self.sweep.set, *overrides, *self._without_structure()), first=True)
+                free = self._add_free((*self.sweep.set, *overrides))
         except (BadCase, BadFormula) as error:
             lines = error.lines if isinstance(error, BadCase) else [str(error)]
             id, wrong = fingerprint({"case": self.base, "overrides": list(overrides)}), lines[0]
@@ -283,10 +284,31 @@ class _Planner:
             self.cases[id] = content
         return id
 
+    def _add_free(self, overrides: tuple[str, ...]) -> str:
+        """The id of the run without structure. Raises BadCase, which says that it is about that run."""
+        try:
+            return self._add((*overrides, *self._without_structure()), first=True)
+        except BadCase as error:
+            raise BadCase(
+                f"{line} (in the run without structure; sweep.free_field may change it)"
+                for line in error.lines
+            ) from error
+
     def _without_structure(self) -> tuple[str, ...]:
         gauges = [k for k, gauge in enumerate(self.base.get("gauge", ())) if gauge["kind"] in OF_STRUCTURE]
         off = [f"gauge[{k}]=absent" for k in reversed(gauges)]
-        return (*(f"{name}=absent" for name in OFF), *off, *self.sweep.free_field)
+        if self.base.get("joints"):
+            off.append("water.cracks=absent")
+        return (*(f"{name}=absent" for name in OFF), *off, *self._refined(), *self.sweep.free_field)
+
+    def _refined(self) -> Iterator[str]:
+        """Without the blocks around which cells are finer; a region that has nothing else to be around is left out."""
+        there = {*ALL, *(solid["name"] for solid in self.base.get("solid", ()))}
+        for k, spec in reversed(list(enumerate(self.base.get("tank", {}).get("refine", ())))):
+            around = spec.get("around") or ()
+            kept = [name for name in around if name in there]
+            if len(kept) < len(around):
+                yield f"tank.refine[{k}].around={inline(kept)}" if kept else f"tank.refine[{k}]=absent"
 
     def _remarks(self, rows: list[Row]) -> Iterator[str]:
         refused = [row for row in rows if row.wrong]
