@@ -28,8 +28,8 @@ class Quantity(Section):
     column: str | None = Field(None, description="column of the table", examples=["box_force_x"])
     figure: str | None = Field(
         None,
-        description="instead of table and column: a name under figures in run.json",
-        examples=["largest_water_force"],
+        description="instead of table and column: a name under figures in run.json; dots lead into its tables",
+        examples=["verdict.largest.force.value"],
     )
     take: Literal["last", "largest", "max", "min", "mean", "at", "integral", "period", "arrival", "curve"] = (
         Field(

@@ -144,7 +144,9 @@ class SweepQuantity(Section):
     )
     column: str | None = Field(None, description="column of the table", examples=["front_level"])
     figure: str | None = Field(
-        None, description="instead: a name under figures in run.json", examples=["largest_water_force"]
+        None,
+        description="instead: a name under figures in run.json; dots lead into its tables",
+        examples=["verdict.weight_moved"],
     )
     formula: str | None = Field(
         None,

@@ -2,18 +2,20 @@
 
 import json
 import math
+from html import unescape
 
 import numpy as np
 import pytest
 
 from coupler.commands.study.runner import Cost
 from coupler.commands.sweep import command
-from coupler.commands.sweep.command import SweepRequest
+from coupler.commands.sweep.command import SweepRequest, _Progress, finish
 from coupler.commands.sweep.folder import figures, read_spec, write_spec
-from coupler.commands.sweep.fragility import curves, read_runs
+from coupler.commands.sweep.fragility import Runs, curves, read_runs, refusal
 from coupler.commands.sweep.one import make, outcome_of
 from coupler.commands.sweep.page import analyse, write
 from coupler.commands.sweep.plan import make_plan
+from coupler.commands.sweep.quantities import read_quantity
 from coupler.commands.sweep.results import collect, open_sweep, write_tables
 from coupler.commands.sweep.sensitivity import rank_rows, sobol_rows
 from coupler.commands.sweep.snakemake import export
@@ -295,6 +297,38 @@ def test_a_run_that_failed_before_the_window_of_a_quantity_is_in_no_state(made):
     assert np.isnan(results.column("peak")).all()
     assert results.column("reason")[0] == "peak: the run has nothing from 2 to 3 s"
     assert read_runs(results, spec.sweep.fragility[0]).unknown == 48
+
+
+def test_a_quantity_that_runs_do_not_have_is_reported_with_the_reason(made, capsys):
+    """By the first run, at the end and on the page, once each; a table of figures says what it holds."""
+    wrong = SWEEP.replace(
+        'table = "history/gauges.csv"\ncolumn = "value"\ntake = "max"', 'figure = "cost"', 1
+    )
+    spec, _ = made(sweep=wrong)
+    progress = _Progress(spec, len(spec.runs))
+    for id in list(spec.runs)[:2]:
+        progress(figures(spec, id))
+    assert (
+        capsys.readouterr().out.count("note: it has no number of peak: run.json has no figure 'cost'; there")
+        == 1
+    )
+    finish(spec, stopped=False)
+    said = "peak has no number in 48 of 48 rows that are done: run.json has no figure 'cost'; there are time"
+    assert capsys.readouterr().out.count(said) == 1
+    assert said in unescape((spec.folder / "report.html").read_text(encoding="utf-8"))
+    assert collect(spec).column("reason")[0].startswith("peak: run.json has")
+    place = spec.place(next(iter(spec.runs)))
+    summary = json.loads((place / "run.json").read_text())
+    summary["figures"]["cost"] = {"water": 1.0}
+    (place / "run.json").write_text(json.dumps(summary))
+    why = read_quantity(place, spec.sweep.quantity[0]).why
+    assert why == "peak: figure 'cost' of run.json is no number; there are cost.water"
+
+
+def test_runs_that_all_change_at_one_intensity_are_refused_in_words_that_fit_it():
+    x = np.array([0.6, 0.9, 0.9, 1.2])
+    said = refusal(Runs(x, np.array([0, 0, 1, 1]), 0, 0, 0), [1], ["cracked"])
+    assert "no run below 0.9 reached 'cracked', every run above did, and of those at 0.9 some" in said
 
 
 def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):

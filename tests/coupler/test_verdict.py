@@ -17,6 +17,7 @@ from coupler.verdict.judge import _largest, places_of, verdict
 from coupler.verdict.watch import Peaks, Watch
 from coupler.verdict.words import sentences, unreached
 from tests.coupler.resumed import DRY, begin
+from tests.coupler.test_docs import FIGURES
 from yade_scripts.blocks.block import Block
 
 G = 9.81
@@ -159,6 +160,11 @@ def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(s
     assert largest["moment"]["about"] == pytest.approx([5.0, 0.0, 0.0])
     assert watch.pressure.value[1] == pytest.approx(1e5)  # over a face of 1 m2
     assert watch.impulse[0] == pytest.approx([1.5e3, 0.0, 0.0])  # 10 ms of the whole and of half
+    for name in FIGURES:
+        found = {"verdict": verdict(s, watch)}
+        for part in name.split("."):
+            found = found[part]
+        assert isinstance(found, float), name
 
 
 def test_the_way_of_a_block_that_is_carried_off_is_no_overturning_moment(scene):

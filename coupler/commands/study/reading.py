@@ -83,5 +83,6 @@ def _figure(run: Path, q: Quantity, place: str) -> float:
             )
         found = figures[name]
     if isinstance(found, bool) or not isinstance(found, int | float):
-        raise BadCase([f"{place}: figure '{q.figure}' of run.json is no number"])
+        inside = [f"{q.figure}.{name}" for name in found] if isinstance(found, dict) else []
+        raise BadCase([f"{place}: figure '{q.figure}' of run.json is no number{_there(inside)}"])
     return float(found)

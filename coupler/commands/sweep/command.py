@@ -178,9 +178,10 @@ def _to_make(spec: Spec, any_version: bool) -> list[str]:
 
 
 class _Progress:
-    """Prints every run that has ended, and an estimate of the time left."""
+    """Prints every run that has ended, an estimate of the time left, and each quantity that a run lacks, once."""
 
     def __init__(self, spec: Spec, total: int):
+        self.sweep, self.free, self.lacking = spec.sweep, {row.free for row in spec.rows}, set()
         self.total, self.count, self.began = total, 0, time.monotonic()
         self.label = {}
         for row in spec.rows:
@@ -200,6 +201,21 @@ class _Progress:
             f"{found['cpu_seconds']:.3g} CPU s{rest}{reason}",
             flush=True,
         )
+        self._lacks(found)
+
+    def _lacks(self, found: dict) -> None:
+        """What the first run shows to have a wrong name would else be known when all runs are made."""
+        if found["outcome"] != "done":
+            return
+        for q in self.sweep.quantity:
+            read = found["readings"].get(q.name)
+            of_it = (q.source == "free field") == (found["id"] in self.free)
+            if read and read["why"] and of_it and q.name not in self.lacking:
+                self.lacking.add(q.name)
+                print(
+                    f"note: it has no number of {q.name}: {read['why'].removeprefix(f'{q.name}: ')}",
+                    flush=True,
+                )
 
 
 def _brief(value) -> str:
@@ -238,6 +254,8 @@ def finish(spec: Spec, stopped: bool) -> ExitCode:
         reason = missing("sweep") or pictures.figures("coupler.commands.view.sweep", spec.folder)
         if reason:
             print(f"note: no figures: {reason}")
+    for sentence in results.lacking:
+        print(f"note: {sentence}")
     print(f"report: {page.write(spec, results)}")
     print(_summary(results))
     left = any(record["outcome"] not in FINAL for record in results.records)

@@ -158,11 +158,16 @@ def refusal(runs: Runs, kept: list[int], names: list[str]) -> str:
     parted = [(names[k - 1], separation(runs.x, runs.state >= k)) for k in kept]
     if all(gap is not None for _, gap in parted):
         name, (low, high) = parted[0]
+        if low == high:
+            where = f"no run below {low:.4g} reached '{name}', every run above did, and of those at {low:.4g} some"
+            more = "add runs at intensities around this one"
+        else:
+            where = f"no run up to {low:.4g} reached '{name}' and every run from {high:.4g} on did"
+            more = "add runs between these two"
         return (
-            f"perfectly separated: no run up to {low:.4g} reached '{name}' and every run from {high:.4g} on did, so "
-            "the dispersion has no likelihood maximum (it would be 0). Runs that differ in nothing but the intensity "
-            "always are: draw strengths (sweep.vary with a distribution, or joints.distribution with sweep.seeds), or "
-            "add runs between these two"
+            f"perfectly separated: {where}, so the dispersion has no likelihood maximum (it would be 0). Runs that "
+            "differ in nothing but the intensity always are: draw strengths (sweep.vary with a distribution, or "
+            f"joints.distribution with sweep.seeds), or {more}"
         )
     return ""
 

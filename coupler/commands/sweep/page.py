@@ -69,7 +69,7 @@ def _page(spec: Spec, results: Results) -> str:
                 ),
             ),
             section("Runs that did not reach their end", _failed(spec, results)),
-            section("All runs", *_rows(spec, results)),
+            section("All runs", *_rows(spec, results), *(note(sentence) for sentence in results.lacking)),
         ],
     )
 

@@ -31,11 +31,13 @@ NOT_YET = "not yet"
 
 @dataclass(frozen=True)
 class Results:
-    """columns as declared; records: a dict of them for each row; figures: how each run ended, by its id."""
+    """columns as declared; records: a dict of them for each row; figures: how each run ended, by its id; lacking: a
+    sentence for each quantity that runs which are done have no number of."""
 
     columns: tuple[Column, ...]
     records: tuple[dict, ...]
     figures: dict[str, dict]
+    lacking: tuple[str, ...] = ()
 
     def column(self, name: str) -> list:
         """The values of a column, row by row."""
@@ -45,8 +47,14 @@ class Results:
 def collect(spec: Spec) -> Results:
     """The results of all rows of a sweep so far."""
     found = {id: ended_run for id in _ids(spec) if (ended_run := figures(spec, id)) is not None}
-    records = tuple(_record(spec, row, found) for row in spec.rows)
-    return Results(tuple(_columns(spec)), records, found)
+    lacks: dict[str, list[str]] = {}
+    records = tuple(_record(spec, row, found, lacks) for row in spec.rows)
+    done = sum(record["outcome"] == "done" for record in records)
+    lacking = tuple(
+        f"{name} has no number in {len(why)} of {done} rows that are done: {why[0]}"
+        for name, why in lacks.items()
+    )
+    return Results(tuple(_columns(spec)), records, found, lacking)
 
 
 def _ids(spec: Spec) -> list[str]:
@@ -82,14 +90,14 @@ def _sets(keys: tuple[str, ...]) -> str:
     return f": sets {', '.join(keys)}" if keys else ""
 
 
-def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
+def _record(spec: Spec, row: Row, found: dict[str, dict], lacks: dict[str, list[str]]) -> dict:
     ended_run = found.get(row.id, {})
     outcome = "refused" if row.wrong else ended_run.get("outcome", NOT_YET)
     record = {"run": row.number, "point": row.point, "sample": row.sample, "repeat": row.repeat}
     record |= {column.name: row.values[column.name] for column in spec.columns}
     record |= {seed_column(key): value for key, value in row.seeds.items()}
     reasons = [row.wrong or ended_run.get("reason", "")]
-    record |= _quantities(spec, row, found, record, reasons)
+    record |= _quantities(spec, row, found, record, reasons, lacks)
     return record | {
         "outcome": outcome,
         "reason": "; ".join(filter(None, dict.fromkeys(reasons))),
@@ -101,8 +109,10 @@ def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
     }
 
 
-def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[str]) -> dict[str, float]:
-    """Quantities of a row; `reasons` receives why a completed run lacks one."""
+def _quantities(
+    spec: Spec, row: Row, found: dict, record: dict, reasons: list[str], lacks: dict[str, list[str]]
+) -> dict[str, float]:
+    """Quantities of a row; `reasons` receives why a completed run lacks one, `lacks` the same by quantity."""
     values: dict[str, float] = {}
     case = None
     for q in asked(spec.sweep):
@@ -117,7 +127,9 @@ def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[s
         else:
             values[q.name], why = _reading(spec, q, id, ended_run)
             if why and ended_run["outcome"] == "done" and spec.sweep.quantity:
+                why = why.removeprefix(f"{q.name}: ")
                 reasons.append(f"{q.name}: {why}")
+                lacks.setdefault(q.name, []).append(why)
             elif id == row.free and ended_run["outcome"] != "done":
                 reasons.append(f"free field: {ended_run['reason']}")
     return values
