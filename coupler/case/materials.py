@@ -228,10 +228,15 @@ def _friction(case: Case, used: dict[str, Material]) -> tuple[ContactPair, ...]:
     assert case.contact is not None
     own = case.contact.pair
     given = {frozenset(pair.materials) for pair in own}
+    assert case.structure is not None
+    ground = "ground" if case.structure.ground is None else case.structure.ground.material
+    below = [
+        ground,
+        *(("tank",) if "tank" in _planes(case) else ()),
+        *(solid.material for solid in case.solid),
+    ]
     wanted = {
-        frozenset((name, other)): used[name].friction
-        for name in used
-        for other in ("ground", *(solid.material for solid in case.solid if solid.material not in used))
+        frozenset((name, other)): used[name].friction for name in used for other in below if other not in used
     }
     for name, one in used.items():
         wanted |= {frozenset((name, other)): min(one.friction, also.friction) for other, also in used.items()}

@@ -66,6 +66,26 @@ def test_a_preset_counts_less_than_what_the_case_says_and_more_than_what_it_says
     assert friction[frozenset({"brick-masonry", "ground"})] == 0.8
 
 
+TANK = "\n[tank]\nlower = [-1, -1, 0]\nupper = [6, 7, 3]\ncell = 0.5\n"
+
+
+@pytest.mark.parametrize(
+    ("ground", "rest", "below"),
+    [
+        ("[structure.ground]\n", TANK, "tank"),
+        ("[structure.ground]\n", '[structure.ground]\nmaterial = "rock"\n', "rock"),
+    ],
+    ids=["floor of the tank", "a ground of another name"],
+)
+def test_presets_rub_on_what_they_stand_on_whatever_its_name(tmp_path, ground, rest, below):
+    """A wall of bricks slid at contact.friction, 0.3, on the floor of its tank, and at 0.8 on a ground of the same."""
+    (tmp_path / "case.toml").write_text(
+        CASE.replace(ground, rest).replace('["concrete", "ground"]', '["concrete", "concrete"]')
+    )
+    friction = {frozenset(p.materials): p.friction for p in load(tmp_path).case.contact.pair}
+    assert friction[frozenset({"brick-masonry", below})] == 0.8
+
+
 def test_explain_knows_a_preset_by_a_word_of_its_name():
     assert explanation("Masonry") == explanation("brick") == explanation("brick-masonry")
     assert explanation("masonry").startswith('material = "brick-masonry"')
