@@ -149,7 +149,7 @@ class Tank(Section):
     smooth: tuple[Side, ...] = Field(
         (),
         description="closed sides along which water slips whatever water.walls is, for instance the symmetry planes "
-        "of a slice",
+        "of a slice; blocks rub on them unless a contact.pair with tank has friction = 0",
     )
 
     _ground: object = PrivateAttr(None)

@@ -5,6 +5,7 @@ case                                         sections that need each other, name
 places, motion, joints, softness, water      bodies, prescribed motions, joints, contacts, walls and inflows
 gauges                                       gauges: places, and what they would read
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
+sides                                        loose blocks that rub on the sides of a slice
 tables                                       results that would be written to one place
 unit_slips                                   values for which most likely another unit was meant
 

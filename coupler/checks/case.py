@@ -22,6 +22,7 @@ from coupler.checks.gauges import gauge_problems, gauge_remarks
 from coupler.checks.joints import joint_problems, pair_problems, uplift_problems
 from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
+from coupler.checks.sides import side_remarks
 from coupler.checks.softness import softness_remarks
 from coupler.checks.tables import table_problems
 from coupler.checks.unit_slips import unit_remarks
@@ -81,6 +82,7 @@ def remarks(case: Case) -> list[str]:
         *material_remarks(case),
         *_joint_remarks(case),
         *_loose_remarks(case),
+        *side_remarks(case),
         *town_remarks(case),
         *_drawing_remarks(case),
     ]

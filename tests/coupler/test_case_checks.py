@@ -355,6 +355,31 @@ def test_a_block_may_be_told_that_it_rests_at_the_start():
     assert reported(case(motion=[MOVED], **structure(rests))) == []
 
 
+@pytest.mark.parametrize(
+    ("changes", "remarked"),
+    [
+        ({}, True),
+        ({"contact": {"stiffness": 1e9, "pair": [{"materials": ["block", "tank"], "friction": 0}]}}, False),
+        ({"joints": {"strength": 1e5, "opening_at_failure": 1e-3}}, False),
+        ({"tank": {"lower": [0, 0, 0], "upper": [4, 2, 3], "cell": 0.5}}, False),
+        ({"tank": {"lower": [0, 0, 0], "upper": [4, 1, 3], "cell": 0.5, "open": ["z+", "y+"]}}, False),
+    ],
+    ids=["a slice", "no friction", "joined", "a gap", "an open side"],
+)
+def test_loose_blocks_from_side_to_side_of_a_slice_are_remarked(changes, remarked):
+    """Their friction on the sides carries a load that a longer wall does not have, and kept one standing."""
+    wall = {"name": "w", "lower": [2, 0, 0], "size": [0.5, 1, 2], "block": [0.5, 0.5, 0.5]}
+    tank = {"lower": [0, 0, 0], "upper": [4, 1, 3], "cell": 0.5}
+    made = case(**{"structure": {"wall": [wall]}, "contact": {"stiffness": 1e9}, "tank": tank} | changes)
+    found = [text for text in remarks(made) if "rub on both sides" in text]
+    assert bool(found) == remarked
+    if remarked:
+        assert "reach from y- to y+ of the tank and rub on both sides, with friction 0.5" in found[0]
+        assert found[0].endswith(
+            'materials = ["block", "tank"], friction = 0, and [structure.ground] for that of the floor'
+        )
+
+
 def test_walls_thinner_than_a_cell_are_remarked():
     """Single covers lose load on walls thinner than a cell; allowed, but not in silence."""
     thin = {"centre": [7, 5, 1], "size": [0.2, 2, 2]}

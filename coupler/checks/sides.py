@@ -1,0 +1,53 @@
+"""Loose blocks that rub on the sides of a slice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.geometry.parts import Part, parts_of
+
+AT = 1e-6
+"""Distance [m] over the size of the tank within which a corner of a block is at a side."""
+
+
+def side_remarks(case: Case) -> Iterator[str]:
+    """Parts of loose blocks that reach from side to side of the tank, whose sides have the friction of the contacts.
+
+    A dry wall of two columns of blocks 2 m high and 0.5 m thick stood in such a slice with 1.5 m of water before it,
+    where 1.4 m overturn it: the water in the joint between the columns pressed them against the sides, and these
+    carried 1.0 of the 6.9 kN m of the water."""
+    if case.structure is None or case.contact is None or case.tank is None or case.joints is not None:
+        return
+    for part in parts_of(case):
+        for axis, name in enumerate("xy"):
+            friction = _friction(case, part.blocks[0].material)
+            if friction > 0.0 and _from_side_to_side(case, part, axis):
+                floor = "" if case.structure.ground else ", and [structure.ground] for that of the floor"
+                yield (
+                    f"the loose blocks of '{part.name}' reach from {name}- to {name}+ of the tank and rub on both "
+                    f"sides, with friction {friction:g}; if the tank is a slice of something longer, write "
+                    f'[[contact.pair]] materials = ["{part.blocks[0].material}", "tank"], friction = 0{floor}'
+                )
+
+
+def _from_side_to_side(case: Case, part: Part, axis: int) -> bool:
+    """Whether blocks of a part that can move have faces at both sides along an axis, and both sides are closed."""
+    assert case.tank is not None
+    name, ends = "xyz"[axis], (case.tank.lower[axis], case.tank.upper[axis])
+    if {f"{name}-", f"{name}+"} & set(case.tank.open):
+        return False
+    slack = AT * float(np.subtract(case.tank.upper, case.tank.lower).max())
+    places = [block.world_vertices()[:, axis] for block in part.blocks if not block.fixed]
+    return all(any((np.abs(x - end) < slack).sum() >= 3 for x in places) for end in ends)
+
+
+def _friction(case: Case, material: str) -> float:
+    """Friction of blocks of a material on the sides of the tank."""
+    assert case.contact is not None
+    for pair in case.contact.pair:
+        if set(pair.materials) == {material, "tank"} and pair.friction is not None:
+            return pair.friction
+    return case.contact.friction
