@@ -83,6 +83,7 @@ def remarks(case: Case) -> list[str]:
         *_joint_remarks(case),
         *_loose_remarks(case),
         *side_remarks(case),
+        *_ramp_remarks(case),
         *town_remarks(case),
         *_drawing_remarks(case),
     ]
@@ -212,6 +213,31 @@ def _loose_remarks(case: Case) -> Iterator[str]:
         return
     for part in (*case.structure.wall, *case.structure.building):
         yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
+
+
+def _ramp_remarks(case: Case) -> Iterator[str]:
+    """Loose blocks under water without their weight: the voussoirs of an arch that stands flew apart within 0.12 s of a
+    ramp of 1 s."""
+    if (
+        case.structure is None
+        or case.structure.start != "ramp"
+        or case.joints is not None
+        or case.water is None
+    ):
+        return
+    fills = [(np.asarray(fill.lower), np.asarray(fill.upper)) for fill in case.water.fill]
+    for part in parts_of(case):
+        free = [block.world_vertices() for block in part.blocks if not block.fixed]
+        if any(
+            (x.min(axis=0) < upper).all() and (x.max(axis=0) > lower).all()
+            for x in free
+            for lower, upper in fills
+        ):
+            yield (
+                f"loose blocks of '{part.name}' begin in water, which lifts them in full from the start, while "
+                f"start = 'ramp' gives them their weight over {case.structure.ramp:g} s: they rise, and the part comes "
+                "apart; write start = 'sudden'"
+            )
 
 
 def _contact_remarks(case: Case) -> Iterator[str]:

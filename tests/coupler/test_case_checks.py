@@ -380,6 +380,25 @@ def test_loose_blocks_from_side_to_side_of_a_slice_are_remarked(changes, remarke
         )
 
 
+@pytest.mark.parametrize(
+    ("place", "more", "remarked"),
+    [
+        ([3, 5, 1], {}, True),
+        ([8, 5, 1], {}, False),
+        ([3, 5, 8], {}, False),
+        ([3, 5, 1], {"joints": {"strength": 1e5, "opening_at_failure": 1e-3}}, False),
+        ([3, 5, 1], {"water": None}, False),
+    ],
+    ids=["in water", "beside it", "above it", "joined", "no water"],
+)
+def test_loose_blocks_in_water_without_their_weight_are_remarked(place, more, remarked):
+    """A dry arch under water came apart in the first tenth of its ramp, and stands with its weight from the start."""
+    blocks = structure({"centre": place, "size": [2, 2, 2]})
+    blocks["structure"] |= {"start": "ramp", "ramp": 1.0}
+    found = [text for text in remarks(case(**blocks | more)) if "start = 'ramp'" in text]
+    assert bool(found) == remarked
+
+
 def test_walls_thinner_than_a_cell_are_remarked():
     """Single covers lose load on walls thinner than a cell; allowed, but not in silence."""
     thin = {"centre": [7, 5, 1], "size": [0.2, 2, 2]}
