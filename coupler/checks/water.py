@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -30,7 +30,7 @@ HIGHEST_WAVE = 0.78
 """Height of a solitary wave over the depth beyond which it breaks."""
 
 EARLY = 0.05
-"""Share of its height that a solitary wave may have at the start without a remark."""
+"""Share of its height that a solitary wave or an N-wave may have at the start without a remark."""
 
 WHOLE_DEPTH = 0.9
 """Share of the depth of still water from which an inflow pushes all of it."""
@@ -91,13 +91,8 @@ def water_remarks(case: Case) -> Iterator[str]:
             yield from _still_water(case, spec)
         if spec.kind == "record":
             yield from _held_ends(case, spec)
-        if spec.kind == "solitary":
-            share = _share_at_start(spec, _depth(case, spec), case.case.gravity)
-            if share > EARLY:
-                yield (
-                    f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
-                    f"strikes; let its crest come later than {spec.crest:g} s"
-                )
+        if spec.kind in ("solitary", "n-wave"):
+            yield from _begun(spec, _depth(case, spec), case.case.gravity)
 
 
 def _without_effect(case: Case) -> Iterator[Problem]:
@@ -246,10 +241,37 @@ def _depth(case: Case, spec) -> float:
     return spec.level - mean_bed(case.tank, spec.side, spec.level)
 
 
-def _share_at_start(spec, depth: float, gravity: float) -> float:
-    """sech²(κ c t_crest), the first-order wave."""
-    phase = math.sqrt(0.75 * spec.height / depth**3) * math.sqrt(gravity * (depth + spec.height)) * spec.crest
-    return 1.0 / math.cosh(min(phase, 100.0)) ** 2
+def _begun(spec, depth: float, gravity: float) -> Iterator[str]:
+    """A wave of which more than EARLY is at its side when the run begins, and from which time on it is not."""
+    name, key, shape, rate = _wave(spec, depth, gravity)
+    share, low, high = shape(rate * getattr(spec, key)), 0.0, 1.0
+    if share <= EARLY:
+        return
+    while shape(high) > EARLY:
+        high *= 2.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if shape(middle) > EARLY else (low, middle)
+    needed = math.ceil(100.0 * high / rate) / 100.0
+    yield (
+        f"the {name} at {spec.side} starts at {100 * share:.0f} % of its height: a jump that strikes; let its {key} "
+        f"come at {needed:g} s or later, not at {getattr(spec, key):g} s"
+    )
+
+
+def _wave(spec, depth: float, gravity: float) -> tuple[str, str, Callable[[float], float], float]:
+    """A wave in words, the key of its time, the largest share of its height up to a phase before that time, and the
+    phase of a second: sech² of the first-order solitary wave, 3 sqrt(3)/2 sech² tanh of the N-wave."""
+    if spec.kind == "solitary":
+        rate = math.sqrt(0.75 * spec.height / depth**3) * math.sqrt(gravity * (depth + spec.height))
+        return "solitary wave", "crest", lambda phase: 1.0 / math.cosh(min(phase, 100.0)) ** 2, rate
+    rate = 1.5 * math.sqrt(math.sqrt(0.75) * spec.height / depth) * math.sqrt(gravity / depth)
+    return "N-wave", "middle", _share_of_n_wave, rate
+
+
+def _share_of_n_wave(phase: float) -> float:
+    phase = min(max(phase, math.atanh(math.sqrt(1.0 / 3.0))), 100.0)
+    return 1.5 * math.sqrt(3.0) * math.tanh(phase) / math.cosh(phase) ** 2
 
 
 def _walls(w) -> Iterator[Problem]:

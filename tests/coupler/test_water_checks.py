@@ -12,6 +12,7 @@ from coupler.geometry.tank_mesh import measured
 from coupler.scene.build import build
 from coupler.scene.side_energy import coming_energy
 from fluid.mesh.background import box_mesh
+from fluid.sides.waves import SolitaryWave, n_wave
 from tests.coupler.water_cases import TANK, case, reported, run
 from tests.fakes import no_clock
 
@@ -499,3 +500,39 @@ def test_a_steady_stream_into_a_sea_that_absorbs_is_told_to_raise_its_level():
     assert told({"absorbs": False}) == told({"absorbs": True}, velocity=0.02) == []
     assert told({"absorbs": True}, velocity=-0.2) == told({"absorbs": True}, absorbs=True) == []
     assert told({"side": "y+", "absorbs": True}) == []
+
+
+@pytest.mark.parametrize(
+    ("wave", "key"),
+    [
+        ({"kind": "solitary", "height": 0.05, "theory": "goring"}, "crest"),
+        ({"kind": "solitary", "height": 0.05, "theory": "grimshaw"}, "crest"),
+        ({"kind": "n-wave", "height": 0.02}, "middle"),
+    ],
+    ids=["solitary", "of third order", "n-wave"],
+)
+def test_the_time_from_which_a_wave_is_not_under_way_at_the_start_is_said(wave, key):
+    """A run that begins at that time has a twentieth of the wave at its side, by the formulas that drive it, and none
+    of the remark; that of a third-order wave of a tenth of the depth is 0.06."""
+    depth = 0.5
+    fill = [{"lower": TANK["lower"], "upper": [*TANK["upper"][:2], depth]}]
+
+    def said(time):
+        inflow = [{"side": "x-", "level": depth, **wave, key: time}]
+        return [
+            text for text in remarks(measured(case({"fill": fill, "inflow": inflow}))[0]) if "strikes" in text
+        ]
+
+    (found,) = said(0.1)
+    assert found.endswith("s or later, not at 0.1 s")
+    time = float(found.split(f"let its {key} come at ")[1].split(" s or later")[0])
+    assert said(time) == []
+    assert len(said(0.98 * time)) == 1
+    if key == "crest":
+        order = {"goring": 1, "grimshaw": 3}[wave["theory"]]
+        made = SolitaryWave(depth, wave["height"], 9.81, time, order)
+        shares = [made.elevation(0.0) / wave["height"]]
+    else:
+        flow = n_wave((1.0, 0.0, 0.0), 0.0, depth, wave["height"], 9.81, time)
+        shares = [abs(flow.level(t) - depth) / wave["height"] for t in (0.0, -0.1, -1.0)]
+    assert max(shares) == pytest.approx(0.05, rel=0.2 if wave.get("theory") == "grimshaw" else 0.02)
