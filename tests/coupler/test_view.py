@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coupler.commands.view.__main__ import main, pixels, rate
-from coupler.commands.view.plots import LINES_PER_PANEL, common, grouped, of_each_block, plots
+from coupler.commands.view.plots import LINES_PER_PANEL, common, grouped, of_each_block, plots, prefixed
 from coupler.program import extras
 from coupler.results.fields import WaterWriter
 from coupler.results.history import HistoryTable, by_block, read_history
@@ -288,3 +288,9 @@ def test_loads_of_each_block_are_a_line_each_or_no_figure(tmp_path, number):
     assert made["time"].tolist() == [0.1, 0.2]
     assert made["f_x_b1"].tolist() == [1.1, 1.2]
     assert [p.name for p in plots(tmp_path, tmp_path)] == (["loads_wall_blocks.pdf"] if number == 2 else [])
+
+
+def test_moments_are_drawn_with_a_prefix_as_forces_are():
+    """400 kN m stood as 400000 N m on the axis under forces in kN, and in kN m in the tables of the report."""
+    assert prefixed("N m", 4.0e5) == (1, "kN·m")
+    assert prefixed("N", 4.0e5) == (1, "kN")

@@ -23,8 +23,8 @@ ROUND_OFF = 1e-12  # pure numbers below this all the time are not shown
 FORMATS = ("pdf", "svg", "png")
 QUANTITY = {"J": "energy", "N": "force", "Pa": "pressure", "m3": "volume", "m/s": "speed"}
 """Of a panel whose lines have no word in common."""
-UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s", "N m s": "N·m·s"}
-PREFIXED = ("J", "N", "N s", "N m s", "Pa", "W", "m", "m/s", "s")
+UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N m": "N·m", "N s": "N·s", "N m s": "N·m·s"}
+PREFIXED = ("J", "N", "N m", "N s", "N m s", "Pa", "W", "m", "m/s", "s")
 PREFIXES = {-2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 SINCE_START = (
     "energy",
