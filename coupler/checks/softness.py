@@ -21,7 +21,7 @@ def softness_remarks(case: Case) -> Iterator[str]:
     """The block with the largest overlap relative to its thickness, if that is beyond `limits.overlap`.
 
     A weight W overlaps by W/K, and a mass m that lands with the speed v by v sqrt(m/K). The speed v is that at the
-    start and of the free fall to what lies below."""
+    start and of the free fall to what lies below, onto which what floats does not fall."""
     if case.structure is None or case.contact is None:
         return
     worst, limit, parts = None, case.limits.overlap, parts_of(case)
@@ -76,12 +76,13 @@ def _stiffness(case: Case, block) -> float | None:
 
 def _falls(case: Case, parts: list[Part]) -> dict[str, float]:
     """Heights [m] from which blocks without support fall, by their names: to the ground, the bed of the tank, or what
-    stands there below their centres, fixed solids and blocks at rest at the start."""
+    stands there below their centres, fixed solids and blocks at rest at the start. What floats does not fall."""
     loose = [
         block
         for part in parts
         if part.path[1] not in STANDING and (case.joints is None or part.path[1] == "rubble")
         for block in part.blocks
+        if not _floats(case, block)
     ]
     if not loose or (case.structure.ground is None and case.tank is None):
         return {}
@@ -101,3 +102,12 @@ def _bed(case: Case, places) -> Array:
             found = np.fmax(found, bed_under(mesh_of(tank), places))
     ground = case.structure.ground
     return found if ground is None else np.maximum(found, ground.level)
+
+
+def _floats(case: Case, block) -> bool:
+    """Whether a block lighter than water has the middle of its underside in the water of the start."""
+    if case.water is None or block.density >= case.water.density:
+        return False
+    corners = block.world_vertices()
+    foot = np.array([*(0.5 * (corners.min(axis=0) + corners.max(axis=0)))[:2], corners[:, 2].min()])
+    return any((foot >= fill.lower).all() and (foot <= fill.upper).all() for fill in case.water.fill)

@@ -77,6 +77,27 @@ def test_blocks_fall_to_what_lies_below_them(quay, fall):
     )
 
 
+WET = """
+[tank]
+lower = [-2, -2, 0]
+upper = [2, 2, 4]
+cell = 0.5
+[[water.fill]]
+lower = [-2, -2, 0]
+upper = [2, 2, 2]
+"""
+
+
+@pytest.mark.parametrize(
+    ("density", "z", "falls"), [(500.0, 2.0, False), (2500.0, 2.0, True), (500.0, 3.0, True)]
+)
+def test_what_floats_does_not_fall_to_the_floor(tmp_path, density, z, falls):
+    """A barge at its draught was to land at 5.6 m/s; one that sinks or is dropped may strike the floor."""
+    text = SOFT.format(stiffness=1e5).replace("density = 2000.0", f"density = {density}")
+    path = write(tmp_path, text.replace("centre = [0, 0, 0.25]", f"centre = [0, 0, {z}]") + WET)
+    assert any("too soft" in text for text in remarks(load(path).case)) == falls
+
+
 def test_crossed_edges_are_measured_by_the_way_that_parts_them():
     """A ridge that sinks 0.02 m into a ridge lies far behind its faces; the way out is short."""
     from scipy.spatial.transform import Rotation
