@@ -33,7 +33,10 @@ from typing import Any
 
 from numba import njit, types
 
+from kernels.kept import read_less
 from kernels.ranges import shared
+
+read_less()
 
 PATIENCE = 60.0
 """Seconds for which a process waits for another one that compiles a kernel: none takes as long, but a process may be
