@@ -18,7 +18,7 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.layers import WORK, Layers
-from kernels.decorators import inlined, inner, kernel, plain, ranged, released
+from kernels.decorators import inlined, inner, kernel, ranged, released
 from kernels.threads import over, owning, reach_of_cells
 
 TESTED = 64
@@ -33,7 +33,7 @@ TESTS = 5
 """Cost of a node and a sweep, in visits of its neighbours."""
 
 
-@plain
+@inlined
 def squared_distance(p, t):
     """Squared distance [m²] from the point p (3,) to the triangle t (3, 3) (Ericson, Real-Time Collision
     Detection (2005), 5.1.5).  It uses scalars only, since it is called millions of times a second."""

@@ -141,15 +141,21 @@ def _by_share(first, last, cell_list, phi, after, parts, u, velocity, beside):
     corners of those that are cut are marked (N,) bool."""
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     for s in range(first, last):
-        e, share = np.uint64(cell_list[s]), 0.0
-        for stage in range(3):
-            for a in range(4):
-                i = parts.cells[e, a]
-                at[a] = phi[i] if stage == 0 else after[i] if stage == 2 else 0.5 * (phi[i] + after[i])
-            part_moments(e, at, parts, total, local, out)
-            part = (total[0] + total[1] + total[2] + total[3]) / parts.volume[e]
-            share += (4.0 if stage == 1 else 1.0) * min(part, 1.0)
-        share /= 6.0
+        e, share, n_wet = np.uint64(cell_list[s]), 0.0, 0
+        for a in range(4):
+            i = parts.cells[e, a]
+            n_wet += (phi[i] < 0.0) + (after[i] < 0.0)
+        if n_wet == 8 and parts.start[e] == parts.start[e + np.uint64(1)]:
+            share = 1.0
+        elif n_wet > 0:
+            for stage in range(3):
+                for a in range(4):
+                    i = parts.cells[e, a]
+                    at[a] = phi[i] if stage == 0 else after[i] if stage == 2 else 0.5 * (phi[i] + after[i])
+                part_moments(e, at, parts, total, local, out)
+                part = (total[0] + total[1] + total[2] + total[3]) / parts.volume[e]
+                share += (4.0 if stage == 1 else 1.0) * min(part, 1.0)
+            share /= 6.0
         for k in range(3):
             velocity[e, k] = share * u[e, k]
         if 0.0 < share < WHOLE:
