@@ -94,12 +94,15 @@ def _measured(columns, values) -> dict[str, float | None]:
 
 
 def _level(spec, rows_of) -> Gauge:
-    at = np.array(spec.at)
+    at, lines = np.array(spec.at), None
 
     def value(coupling):
-        from fluid.readings.gauges import level
+        from fluid.readings.gauges import Lines
 
-        return level(coupling.water, at)
+        nonlocal lines
+        if lines is None or lines.domain is not coupling.water.domain:
+            lines = Lines.of(coupling.water, [at])
+        return float(lines.depths(coupling.water)[0])
 
     return _in_time(spec, "level", "m", f"depth of water over (x, y) = {spec.at}", value)
 

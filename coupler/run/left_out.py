@@ -40,7 +40,7 @@ def _of_water(coupling, record) -> dict[str, int]:
     return {
         "mesh_cells": len(water.mesh.cells),
         "cells": len(topology.cells),
-        "wet_cells": wet_cells(water.level_set, topology.cells),
+        "wet_cells": wet_cells(water),
         "bodies": water.domain.n_bodies,
         "bodies_cut": record.bodies_cut,
         "passes": record.passes,

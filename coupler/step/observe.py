@@ -10,6 +10,7 @@ from array_types import Array
 
 if TYPE_CHECKING:
     from coupler.step.sides import CoupledSides
+    from fluid.step.water import Water
     from yade_scripts.dynamics.structure import Structure
 
 
@@ -35,21 +36,16 @@ def size(coupling: CoupledSides) -> dict[str, int]:
         water, topology = coupling.water, coupling.water.topology
         found["cells"] = len(topology.cells)
         found["cut_cells"] = int(water.domain.is_cut.sum())
-        found["wet_cells"] = wet_cells(water.level_set, topology.cells)
+        found["wet_cells"] = wet_cells(water)
     if coupling.structure is not None:
         found["blocks"] = coupling.structure.n
         found["joints"] = joint_counts(coupling.structure).intact
     return found
 
 
-def wet_cells(level_set: Array, cells: Array) -> int:
-    """Cells (M, 4) with a node in the water; four flags are read as one number, which takes a tenth of the time."""
-    from fluid.numerics.spans import spans
-
-    wet, count = level_set < 0.0, 0
-    for some in spans(len(cells)):
-        count += int(np.count_nonzero(wet.take(cells[some]).view(np.uint32)))
-    return count
+def wet_cells(water: Water) -> int:
+    """Cells with a node in the water."""
+    return len(water.topology.cells_around(water.level_set < 0.0))
 
 
 def block_damage(structure: Structure) -> Array:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from array_types import Array
+from array_types import Array, Floats
 from fluid.cut.fans import tetrahedra_of
 from fluid.domain.moments import wet_fraction
 from fluid.domain.point_location import NEAR, Places
 from fluid.readings.clip import clipped, clipped_triangles, sections, volumes
 from fluid.readings.solid_spans import Spans, solid_spans
+
+if TYPE_CHECKING:
+    from fluid.domain.physical_domain import PhysicalDomain
 
 SAMPLES_PER_CELL = 4
 CORNERS_AND_MIDDLE = ((0.0, 0.0), (-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5))
@@ -30,28 +36,54 @@ def level(water, xy) -> float:
 def levels(water, places, foot=None) -> Array:
     """Depths (m,) [m] of water over places (m, 2) [m], each as of `level`; foot (m,) [m]: heights z from which on water
     counts there, where they are known: in the seam of two solids a line may run beside both. None: from the lowest."""
-    places = np.asarray(places, float)
-    foot = np.full(len(places), -np.inf) if foot is None else foot
-    low, high = water.mesh.bounds[:, 2]
-    count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.finest)) + 1
-    z = np.linspace(low, high, count)
-    solid = _with_feet(solid_spans(water, places), foot, low)
-    through = np.unique(solid.line)
-    samples = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
-    ends = np.column_stack([np.tile(places[solid.line], (2, 1)), np.concatenate([solid.low, solid.high])])
-    phi = Places.of(water, np.concatenate([samples, ends]), beyond=True).read(water.level_set)
-    phi, at_ends = phi[: len(samples)].reshape(-1, count), phi[len(samples) :]
-    phi[z < foot[:, None]] = np.nan
-    clear = np.ones(len(places), bool)
-    clear[through] = False
-    depth = np.zeros(len(places))
-    depth[clear] = _in_the_open(water, places[clear], foot[clear], z, phi[clear])
-    if len(through):
-        there = solid._replace(line=np.searchsorted(through, solid.line))
-        depth[through] = _between_solids(
-            water, places[through], foot[through], z, phi[through], there, at_ends
-        )
-    return depth
+    return Lines.of(water, places, foot).depths(water)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Upright lines through places (m, 2) [m] of a domain, with what stays as long as it does: foot (m,) [m] as in
+    `levels` · z (count,) [m] heights of the samples on each · solid: what solids take of them · at: the samples, and
+    the lower and the upper ends of what solids take."""
+
+    domain: PhysicalDomain
+    places: Floats
+    foot: Floats
+    z: Floats
+    solid: Spans
+    at: Places
+
+    @classmethod
+    def of(cls, water, places, foot=None) -> Lines:
+        """Look the samples up. Raises Outside if all of them lie outside the mesh."""
+        places = np.asarray(places, float)
+        foot = np.full(len(places), -np.inf) if foot is None else foot
+        low, high = water.mesh.bounds[:, 2]
+        count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.finest)) + 1
+        z = np.linspace(low, high, count)
+        solid = _with_feet(solid_spans(water, places), foot, low)
+        samples = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
+        ends = np.column_stack([np.tile(places[solid.line], (2, 1)), np.concatenate([solid.low, solid.high])])
+        at = Places.of(water, np.concatenate([samples, ends]), beyond=True)
+        return cls(water.domain, places, foot, z, solid, at)
+
+    def depths(self, water) -> Array:
+        """Depths (m,) [m] of the present water."""
+        places, foot, z, solid = self.places, self.foot, self.z, self.solid
+        n_samples = len(places) * len(z)
+        through = np.unique(solid.line)
+        phi = self.at.read(water.level_set)
+        phi, at_ends = phi[:n_samples].reshape(-1, len(z)), phi[n_samples:]
+        phi[z < foot[:, None]] = np.nan
+        clear = np.ones(len(places), bool)
+        clear[through] = False
+        depth = np.zeros(len(places))
+        depth[clear] = _in_the_open(water, places[clear], foot[clear], z, phi[clear])
+        if len(through):
+            there = solid._replace(line=np.searchsorted(through, solid.line))
+            depth[through] = _between_solids(
+                water, places[through], foot[through], z, phi[through], there, at_ends
+            )
+        return depth
 
 
 def _with_feet(solid: Spans, foot, low: float) -> Spans:

@@ -83,9 +83,11 @@ def test_a_directory_without_a_run_is_refused(tmp_path):
 
 def test_counts_are_means_over_the_steps():
     """A tank of two tetrahedra of which the second dries after the first step: 1.5 wet cells a step."""
+    cells = np.array([[0, 1, 2, 3], [4, 5, 6, 7]])
+    around = lambda nodes: np.flatnonzero(nodes[cells].any(axis=1))  # noqa: E731
     water = SimpleNamespace(
         mesh=SimpleNamespace(cells=np.zeros((3, 4))),
-        topology=SimpleNamespace(cells=np.array([[0, 1, 2, 3], [4, 5, 6, 7]])),
+        topology=SimpleNamespace(cells=cells, cells_around=around),
         domain=SimpleNamespace(n_bodies=0),
         level_set=-np.ones(8),
     )
