@@ -1,0 +1,29 @@
+"""Connected water, against scipy's components of the same graph."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fluid.surface.pools import pools
+from tests.fluid.scenes import tank
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.5, 0.97, 1.0])
+def test_pools_are_the_components_of_the_water(share):
+    t = tank([1.0, 0.9, 0.8], 0.1, lambda x: x[:, 2] - 0.4).topology
+    start, neighbours = t.around
+    phi = np.where(np.random.default_rng(3).random(len(t.nodes)) < share, -1.0, 1.0)
+    label, count = pools(phi, start, neighbours)
+
+    wet, n = np.flatnonzero(phi < 0.0), len(phi)
+    ways = sp.csr_array(
+        (np.ones(len(neighbours)), neighbours.astype(np.int64), start.astype(np.int64)), shape=(n, n)
+    )
+    expected, component = connected_components(ways[wet][:, wet], directed=False)
+    assert count == expected
+    assert len(np.unique(np.column_stack([component, label[wet]]), axis=0)) == expected
+    assert (np.unique(label[wet], return_index=True)[1] == np.unique(component, return_index=True)[1]).all()
+    for i in np.flatnonzero(phi >= 0.0):
+        row = neighbours[start[i] : start[i + 1]]
+        assert label[i] == next((label[j] for j in row if phi[j] < 0.0), -1)
