@@ -26,6 +26,8 @@ from coupler.run.fast_openings import resolved_row
 from coupler.step.observe import joint_counts
 
 LONGEST_REST_STEP = 0.3
+NO_DAMAGE = 1e-12
+"""Damage of joints that is round-off."""
 BYTES_PER_BLOCK = 60_000
 """Resident memory per block, its contact nodes included."""
 BYTES_PER_WET_BLOCK = 300_000
@@ -243,10 +245,9 @@ def _row_at_rest(structure, rows: list[Row]) -> None:
     from yade_scripts.dynamics.equilibrium import settle
 
     moved = settle(structure)
-    damage = structure.joint_table().damage.max()
-    rows.append(
-        Row("damage at rest", float(damage), "", f"under its own weight; blocks move {1e3 * moved:.3g} mm")
-    )
+    damage = float(structure.joint_table().damage.max())
+    damage = damage if damage > NO_DAMAGE else 0.0
+    rows.append(Row("damage at rest", damage, "", f"under its own weight; blocks move {1e3 * moved:.3g} mm"))
 
 
 def _frequency_row(structure, bound: float) -> Row:

@@ -57,8 +57,8 @@ def command_line():
     parser.add_argument(
         "--view",
         choices=[*VIEWS, INSIDE],
-        help="a plan, an elevation from y- (south), x+ (east), y+ (north) or x- (west), or a view from among the "
-        "blocks towards --azimuth (default: where joints break)",
+        help="a plan; an elevation, seen from the south (y-), east (x+), north (y+) or west (x-); or inside, a "
+        "view from among the blocks towards --azimuth (default: where joints break)",
     )
     parser.add_argument(
         "--cut",
