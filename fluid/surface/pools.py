@@ -56,15 +56,15 @@ def _root(before, i):
     return i
 
 
-def own_shift(label, count: int, lack, area, most: float) -> Array:
+def own_shift(label, count: int, lack, area, total: float) -> Array:
     """Length (N,) [m] by which the surface of each pool is to rise, or to sink, for what the pool itself lacks, or has
     too much: 0 in those that are off in the other way than the total, and where there is no surface.
 
-    label (N,), count: of `pools` · lack (N,) [m³], area (N,) [m²]: of the nodes · most [m³]: of the total, whose sign
-    counts."""
+    label (N,), count: of `pools` · lack (N,) [m³], area (N,) [m²]: of the nodes · total [m³]: what all water
+    lacks, of which the sign counts."""
     there = label >= 0
     off, surface = (
-        np.bincount(label[there], values[there], minlength=count) for values in (np.sign(most) * lack, area)
+        np.bincount(label[there], values[there], minlength=count) for values in (np.sign(total) * lack, area)
     )
     length = np.where(surface > 0.0, np.maximum(off, 0.0) / np.where(surface > 0.0, surface, 1.0), 0.0)
     return np.where(there, length[label], 0.0)

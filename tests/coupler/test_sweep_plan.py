@@ -317,37 +317,6 @@ def test_a_uniform_distribution_without_a_whole_number_is_refused(case):
         make_plan(case(sweep))
 
 
-def test_the_free_field_is_made_once_for_all_that_differ_in_the_structure(case):
-    plan = make_plan(
-        case(
-            """
-[[sweep.vary]]
-name = "density"
-key = "structure.block[0].density"
-values = [500, 600, 700]
-[[sweep.vary]]
-name = "depth"
-key = "water.fill[0].upper[2]"
-values = [0.8, 1.2]
-[[sweep.quantity]]
-name = "flow"
-table = "history/gauges.csv"
-column = "front_level"
-take = "max"
-source = "free field"
-""",
-            text=WATER.replace("centre = [3", "density = 500\ncentre = [3"),
-        )
-    )
-    free = list(dict.fromkeys(row.free for row in plan.rows))
-    assert len(plan.runs) == 8
-    assert list(plan.runs)[:2] == free[::-1] or set(list(plan.runs)[:2]) == set(free)
-    for id in free:
-        found = load(plan.file.path, plan.runs[id]).case
-        assert found.structure is None
-        assert [gauge.name for gauge in found.gauge] == ["front"]
-
-
 FREE_DEPTH = """
 [[sweep.vary]]
 name = "depth"
@@ -360,6 +329,28 @@ column = "front_level"
 take = "max"
 source = "free field"
 """
+
+
+def test_the_free_field_is_made_once_for_all_that_differ_in_the_structure(case):
+    plan = make_plan(
+        case(
+            """
+[[sweep.vary]]
+name = "density"
+key = "structure.block[0].density"
+values = [500, 600, 700]
+"""
+            + FREE_DEPTH,
+            text=WATER.replace("centre = [3", "density = 500\ncentre = [3"),
+        )
+    )
+    free = list(dict.fromkeys(row.free for row in plan.rows))
+    assert len(plan.runs) == 8
+    assert list(plan.runs)[:2] == free[::-1] or set(list(plan.runs)[:2]) == set(free)
+    for id in free:
+        found = load(plan.file.path, plan.runs[id]).case
+        assert found.structure is None
+        assert [gauge.name for gauge in found.gauge] == ["front"]
 
 
 def test_the_free_field_leaves_out_all_that_is_about_the_structure(case):

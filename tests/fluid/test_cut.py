@@ -92,9 +92,9 @@ def test_volume_and_surface_of_unions_of_boxes(family):
 )
 def test_bodies_almost_on_mesh_planes(tilt, exponent, shift):
     """A face that misses a mesh plane by 1e-16 to 1e-2 keeps all of its surface: slivers are cut, or
-    snapped on both sides alike. Of a box turned by 1e-10 to 1e-8 a strip of a side, as wide as the turn moves it, may be
-    lost: the plane of the side is snapped to some of the nodes of a plane of the mesh and not to the others (5e-9 of 1.5 in
-    the first example, 2.5e-10 in the second)."""
+    snapped on both sides alike. Of a box turned by 1e-10 to 1e-8 a strip of a side, as wide as the turn moves it, may
+    be lost: the plane of the side is snapped to some of the nodes of a plane of the mesh and not to the others (5e-9 of
+    1.5 in the first example, 2.5e-10 in the second)."""
     turn = Rotation.from_euler("xyz", [tilt * 10.0**exponent, 0.3 * tilt * 10.0**exponent, 0]).as_matrix()
     bodies = ConvexBodies.boxes([[0.5, 0.5, 0.5 + shift * 10.0**exponent]], [[0.5, 0.5, 0.5]], turn[None])
     domain = cut_domain(MESH, bodies)
