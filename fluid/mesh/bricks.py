@@ -18,9 +18,15 @@ from array_types import Array
 
 def split_bricks(axes, split: str = "kuhn") -> tuple[Array, Array]:
     """Nodes (N, 3) [m] and cells (6 n, 4) of the bricks between the coordinates axes (three arrays [m]), with the six
-    cells of a brick one after the other, so that neighbours in space are close in memory."""
-    mesh = MeshTet.init_tensor(*axes)
-    nodes = mesh.p.T
+    cells of a brick one after the other, so that neighbours in space are close in memory.
+
+    Numbers run along the axis with the fewest coordinates first and along that with the most last (of two alike along y
+    before x and x before z), so that a range of numbers has the smallest borders to others that there are."""
+    first, middle, last = sorted((1, 0, 2), key=lambda k: len(axes[k]))
+    order = [middle, first, last]  # of scikit-fem's lattice the second axis runs first
+    mesh = MeshTet.init_tensor(*(axes[k] for k in order))
+    nodes = np.empty_like(mesh.p.T)
+    nodes[:, order] = mesh.p.T
     bricks = SPLITS[split](nodes, mesh.t.T.reshape(6, -1, 4).swapaxes(0, 1).astype(np.int64), axes)
     return nodes, bricks.reshape(-1, 4)
 
