@@ -54,7 +54,7 @@ from array_types import Array
 from fluid.domain.topology import Graph, Topology
 from fluid.numerics.fields import copied, places_of
 from fluid.surface.volume import Flux, Shift, diffused_shift
-from fluid.transport.velocity_transport import carry_velocity
+from fluid.transport.velocity_transport import NO_WATER, carry_velocity
 from fluid.transport.volume_transport import carry_volume
 from kernels.decorators import inner, ranged, released
 from kernels.threads import over, zeros
@@ -143,22 +143,25 @@ class Carried:
         gained = (correction.nodal_water, held, self.swept)
         _pass_on(graph, correction.shift, gained, jumps, self.water, t.node_volume, self.velocity)
         at_surface = (phi, t.node_size, t.near_solids)
-        state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
+        state = ((self.water, t.node_volume), (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
         return jumps
 
 
 @ranged
-def _mixed(first, last, nodes, water, weights, at_surface, on_open_side, carried, u):
+def _mixed(first, last, nodes, volumes, weights, at_surface, on_open_side, carried, u):
     """Equation (1) in place at the listed nodes that hold water.
 
-    weights (N,): around jumps, and in fast water · at_surface (N,): φ and size of the cells [m], near solids bool."""
-    (around_jumps, fast), (phi, spacing, near_solids) = weights, at_surface
+    volumes (N,) [m³]: what nodes hold, and could hold · weights (N,): around jumps, and in fast water · at_surface
+    (N,): φ and size of the cells [m], near solids bool."""
+    (water, capacity), (around_jumps, fast), (phi, spacing, near_solids) = volumes, weights, at_surface
     for s in range(first, last):
         i = nodes[s]
         depth = (phi[i] / spacing[i] + DEEP) / (DEEP - SHALLOW)
         weight = 0.0 if near_solids[i] else around_jumps[i] * min(max(depth, 0.0), 1.0)
-        weight = max(weight, 0.0 if on_open_side[i] else fast[i]) if water[i] > 0.0 else 0.0
+        weight = max(weight, 0.0 if on_open_side[i] else fast[i])
+        if water[i] <= NO_WATER * capacity[i]:
+            weight = 0.0
         for k in range(3):
             u[i, k] += weight * (carried[i, k] - u[i, k])
 
@@ -177,12 +180,12 @@ def _pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> N
     gained: m_i = first - second + third (N,) [m³] · share (N,) of its rest that is passed on · water, capacity (N,)
     [m³]: what the nodes hold before, and could hold."""
     n, edges, spacing = len(water), graph.edges, shift.spacing
-    holds = water[shift.band] > 0.0
+    holds = water[shift.band] > NO_WATER * capacity[shift.band]
     band, moved = shift.band[holds], np.empty(len(graph.neighbour))
     chi, inside, came = zeros((n,)), np.zeros(n, bool), np.zeros(n)
     chi[band], inside[band] = shift.kappa * shift.value[holds], True
     over(_passed, len(band), band, edges, chi, inside, spacing, water, moved)
-    carry_velocity(band, edges, moved, water, u, came)
+    carry_velocity(band, edges, moved, (water, capacity), u, came)
     sought = np.empty(len(band))
     if not sum(over(_sought, len(band), band, gained, share, came, sought)):
         return
@@ -192,7 +195,7 @@ def _pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> N
     edges, left = edges._replace(stiffness=stiffness), np.maximum(water + came, 0.0)
     chi[band] = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
     over(_passed, len(band), band, edges, chi, inside, spacing, left, moved)
-    carry_velocity(band, edges, moved, left, u)
+    carry_velocity(band, edges, moved, (left, capacity), u)
 
 
 @released

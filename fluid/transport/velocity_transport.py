@@ -7,7 +7,7 @@ fluxes: Rudman, Int. J. Numer. Methods Fluids 28 (1998) 357),
 
 with the mean velocity u_up of what flows into i and B the limiter of van Leer (J. Comput. Phys. 14 (1974) 361),
 2ab/(a + b) where both differences have the same sign and 0 elsewhere. Σ W u is kept to round-off, and no u leaves the
-range around it.
+range around it. Nodes that hold next to nothing afterwards keep the u they had: of a volume that is round-off, so is u.
 """
 
 from __future__ import annotations
@@ -20,20 +20,23 @@ from kernels.threads import over, owning, reach_of_rows
 
 NONE = np.empty(0)
 """No field (N,)."""
+NO_WATER = 1e-10
+"""Share of what a node can hold up to which its water counts as none: what sums of what comes and goes leave over."""
 
 
-def carry_velocity(nodes, edges: Edges, moved, water, u, gain=NONE):
+def carry_velocity(nodes, edges: Edges, moved, volumes, u, gain=NONE):
     """Equation (1): u (N, 3) [m/s] after the volumes moved (edges,) [m³] left the listed nodes, in place.
 
-    water (N,) [m³] before they are moved; no node gives more than it holds · gain (N,) [m³], if given: what came to
-    each node less what left it is added, in place."""
+    volumes (N,) [m³]: what nodes hold before it is moved, no node giving more, and what they could hold · gain (N,)
+    [m³], if given: what came to each node less what left it is added, in place."""
+    water = volumes[0]
     size, reach = len(water), reach_of_rows(nodes, edges.row, edges.start, edges.neighbour)
     up, came, change, volume = (np.empty(shape) for shape in (u.shape, size, u.shape, size))
     over(_begin, len(nodes), nodes, up, came, change, volume)  # what others get is not read
     owning(_incoming, size, reach, len(nodes), nodes, edges, moved, u, up, came)
     over(_mean_incoming, len(nodes), nodes, came, u, up)
     owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume, gain)
-    over(_new_velocity, len(nodes), nodes, water, change, volume, u)
+    over(_new_velocity, len(nodes), nodes, volumes, change, volume, u)
 
 
 @ranged
@@ -47,10 +50,11 @@ def _begin(first, last, nodes, up, came, change, volume):
 
 
 @ranged
-def _new_velocity(first, last, nodes, water, change, volume, u):
+def _new_velocity(first, last, nodes, volumes, change, volume, u):
+    water, capacity = volumes
     for s in range(first, last):
         i = nodes[s]
-        if volume[i] > 1e-9 * water[i] and volume[i] > 0.0:
+        if volume[i] > max(1e-9 * water[i], NO_WATER * capacity[i]):
             for k in range(3):
                 u[i, k] = (max(water[i], 0.0) * u[i, k] + change[i, k]) / volume[i]
 

@@ -49,7 +49,7 @@ def carry_volume(flux: Flux, dt: float, u=None):
         over(_share, count, flux.nodes, water, capacity, share)
         over(_moved, count, flux.nodes, edges, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
-            carry_velocity(flux.nodes, edges, moved, water, u, change)
+            carry_velocity(flux.nodes, edges, moved, (water, capacity), u, change)
         else:
             owning(_transfer_volume, len(water), reach, count, flux.nodes, edges, moved, change)
         over(_changed, len(water), change, water)

@@ -145,14 +145,13 @@ def test_water_of_another_size_flows_the_same_bit_for_bit(name, length, density)
 @pytest.mark.parametrize("covers", ["single", "multiple"])
 @pytest.mark.parametrize(("length", "density"), SIZES)
 def test_blocks_of_another_size_move_the_same(covers, length, density):
-    """Boxes glued to one another and a spinning wedge that dives. Equal but for round-off: pivots of the 6 x 6 matrices
-    of the blocks, with forces and moments in them, are chosen by size. Ends before joints break and the wedge strikes
-    (0.19 s): the last digit decides in which of two steps a block that creeps is cut again, or in which substep a
-    contact slides, and differences of 1e-5 are made of 1e-16."""
+    """Boxes glued to one another, which the water reaches at 0.2 s, and a spinning wedge that dives. Equal but for
+    round-off: pivots of the 6 x 6 matrices of the blocks, with forces and moments in them, are chosen by size. Later,
+    at 0.34 s, the last digit decides in which substep a contact of the wedge slides."""
     sections = {"covers": covers, "blocks": True}
-    found, expected = (at_scale(covers, 0.17, sections, *size) for size in ((length, density), (1.0, 1.0)))
+    found, expected = (at_scale(covers, 0.3, sections, *size) for size in ((length, density), (1.0, 1.0)))
     error = np.abs(found - expected).max(axis=0) / np.maximum(np.abs(expected).max(axis=0), 1e-3)
-    assert error.max() < 1e-7
+    assert error.max() < 1e-9
 
 
 def arch(place, order):
