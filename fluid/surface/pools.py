@@ -5,55 +5,125 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from kernels.decorators import inner, kernel
+from kernels.decorators import inner, kernel, ranged, released
+from kernels.threads import found_over, over
+
+WORK = 3
+"""Cost of a node, in usual rows."""
+BESIDE = -2
+"""Mark of a dry node beside water until it has its number."""
 
 
-@kernel
-def pools(phi, start, neighbours):
+def pools(phi, start, neighbours) -> tuple[Array, int]:
     """Number (N,) of the pool of every node with water, φ (N,) < 0, and of every dry one beside some, that of the first
     in its row; -1 elsewhere. And how many there are. start (N + 1,), neighbours: nodes that share a cell.
 
-    Trees of nodes are joined (Galler and Fisher, CACM 7 (1964) 301): every node is visited once, in order, and not all
-    over the mesh as by flooding, which took twice as long."""
-    n, count = phi.shape[0], 0
-    label, before = np.full(n, -1, np.int32), np.empty(n, np.int32)
-    for i in range(n):
+    Trees of nodes are joined (Galler and Fisher, CACM 7 (1964) 301), in ranges of nodes and then along their borders.
+    The root of a tree is its lowest node, so that numbers do not depend on the ranges."""
+    n = len(phi)
+    label, before = np.empty(n, np.int32), np.empty(n, np.uint32)
+    _join(
+        phi,
+        found_over(_trees, n, phi, start, neighbours, label, before, weight=WORK, pieces=1),
+        label,
+        before,
+    )
+    roots = found_over(_roots, n, phi, before)
+    label[roots] = np.arange(len(roots), dtype=np.int32)
+    over(_numbers, n, phi, start, neighbours, before, label)
+    return label, len(roots)
+
+
+@released
+def _trees(first, last, phi, start, neighbours, label, before):
+    """Trees of the water of a range: the node before (N,) each one, a root before itself; marks of the range, BESIDE or
+    -1, in label (N,). → pairs (k, 2) of a node with water and one beyond the range that is to be joined to it."""
+    for i in range(first, last):
+        label[i], before[i] = -1, i
+    low, high = np.uint64(first), np.uint64(last)
+    pairs, count = np.empty((256, 2), np.uint32), 0
+    for k in range(first, last):
+        i = np.uint64(k)
         if not phi[i] < 0.0:
             continue
-        before[i] = i
-        root = np.int64(i)
-        for s in range(start[i], start[i + 1]):
-            j = np.int64(neighbours[s])
-            if not phi[j] < 0.0:
-                if label[j] < 0:
-                    label[j] = i
-            elif j < i:
-                other = _root(before, j)
-                before[max(root, other)] = min(root, other)
-                root = min(root, other)
-    for i in range(n):
-        if phi[i] < 0.0:
-            if before[i] == i:
-                label[i] = count
-                count += 1
-            else:
-                label[i] = label[before[i]]
-    for i in range(n):
-        if label[i] >= 0 and not phi[i] < 0.0:
+        root, end = i, start[i + np.uint64(1)]
+        if count + end - start[i] > pairs.shape[0]:
+            longer = np.empty((2 * pairs.shape[0] + end - start[i], 2), np.uint32)
+            longer[:count] = pairs[:count]
+            pairs = longer
+        for s in range(start[i], end):
+            j = np.uint64(neighbours[s])
+            if phi[j] < 0.0:
+                if j > i:
+                    continue
+                if j >= low:
+                    if before[j] != root:
+                        root = _joined(before, root, _root(before, j))
+                    continue
+            elif low <= j < high:
+                label[j] = BESIDE
+                continue
+            pairs[count, 0], pairs[count, 1] = i, j
+            count += 1
+    return pairs[:count].copy()
+
+
+@kernel
+def _join(phi, pairs, label, before):
+    """Join the trees of different ranges at pairs of nodes, and mark dry nodes of the pairs."""
+    for k in range(pairs.shape[0]):
+        i, j = np.uint64(pairs[k, 0]), np.uint64(pairs[k, 1])
+        if phi[j] < 0.0:
+            _joined(before, _root(before, i), _root(before, j))
+        else:
+            label[j] = BESIDE
+
+
+@released
+def _roots(first, last, phi, before):
+    """The roots of the range, in order."""
+    found, count = np.empty(last - first, np.int32), 0
+    for i in range(first, last):
+        if phi[i] < 0.0 and before[i] == i:
+            found[count] = i
+            count += 1
+    return found[:count].copy()
+
+
+@ranged
+def _numbers(first, last, phi, start, neighbours, before, label):
+    """Numbers of the range, from those of the roots."""
+    for k in range(first, last):
+        i = np.uint64(k)
+        at = i
+        if not phi[i] < 0.0:
+            if label[i] != BESIDE:
+                continue
             s = start[i]
             while not phi[neighbours[s]] < 0.0:
                 s += 1
-            label[i] = label[neighbours[s]]
-    return label, count
+            at = np.uint64(neighbours[s])
+        while before[at] != at:
+            at = np.uint64(before[at])
+        if at != i:
+            label[i] = label[at]
 
 
 @inner
 def _root(before, i):
-    """The first node of the tree of node i; ways to it get shorter."""
+    """The root of the tree of node i; ways to it get shorter."""
     while before[i] != i:
-        before[i] = before[before[i]]
-        i = np.int64(before[i])
+        before[i] = before[np.uint64(before[i])]
+        i = np.uint64(before[i])
     return i
+
+
+@inner
+def _joined(before, root, other):
+    """The lower of two roots, now before the other."""
+    low = min(root, other)
+    before[max(root, other)] = low
+    return low
 
 
 def own_shift(label, count: int, lack, area, total: float) -> Array:

@@ -6,6 +6,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fluid.surface.pools import pools
+from kernels import threads
 from tests.fluid.scenes import tank
 
 
@@ -27,3 +28,22 @@ def test_pools_are_the_components_of_the_water(share):
     for i in np.flatnonzero(phi >= 0.0):
         row = neighbours[start[i] : start[i + 1]]
         assert label[i] == next((label[j] for j in row if phi[j] < 0.0), -1)
+
+
+@pytest.fixture
+def on_threads():
+    yield lambda n: threads.use(n, least=1)
+    threads.use(1)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 16])
+def test_pools_of_ranges_are_joined_along_their_borders(count, on_threads):
+    """Water winds through all ranges, and what is dry lies beside some of it everywhere."""
+    t = tank([1.0, 0.9, 0.8], 0.1, lambda x: x[:, 2] - 0.4).topology
+    x, y, z = t.nodes.T
+    phi = np.cos(14.0 * x) * np.cos(11.0 * y) + 0.5 * np.cos(9.0 * z) + 0.4
+    expected, number = pools(phi, *t.around)
+    on_threads(count)
+    label, found = pools(phi, *t.around)
+    assert number == found > 2
+    np.testing.assert_array_equal(label, expected)
