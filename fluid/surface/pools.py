@@ -22,12 +22,8 @@ def pools(phi, start, neighbours) -> tuple[Array, int]:
     The root of a tree is its lowest node, so that numbers do not depend on the ranges."""
     n = len(phi)
     label, before = np.empty(n, np.int32), np.empty(n, np.uint32)
-    _join(
-        phi,
-        found_over(_trees, n, phi, start, neighbours, label, before, weight=WORK, pieces=1),
-        label,
-        before,
-    )
+    pairs = found_over(_trees, n, phi, start, neighbours, label, before, weight=WORK, pieces=1)
+    _join(phi, pairs, label, before)
     roots = found_over(_roots, n, phi, before)
     label[roots] = np.arange(len(roots), dtype=np.int32)
     over(_numbers, n, phi, start, neighbours, before, label)
