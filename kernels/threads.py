@@ -37,7 +37,7 @@ LEAST_ROWS = 1_000
 """Least number of rows that is worth a thread: handing them over takes as long as two hundred of them."""
 BLOCK = 256
 """Number of consecutive entries of a list that are skipped, or kept, together."""
-CHUNK = 16_384
+CHUNK = 4_096
 """Number of entries that are summed as one chunk; shorter sums have one chunk."""
 ROW, LAZY = 64, OWN
 """Numbers that are filled or passed by as one row, and bytes from which the C library returns pages that are zero
@@ -154,16 +154,15 @@ def owns_any(first, last, cells, e):
     return some
 
 
-def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array:
+def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args, weight: float = 1) -> Array:
     """Σ over 0 ... `count` of what kernel(first, last, *args, partial) adds to partial[c] (*shape) in each CHUNK c from
-    `first` to before `last`: the sums of chunks, which do not depend on the threads, are added in their order."""
+    `first` to before `last`: the sums of chunks, which do not depend on the threads, are added in their order.
+
+    weight: as in `over`."""
     chunks = max(1, -(-count // CHUNK))
-    partial = np.zeros((chunks, *shape))
-    over(kernel, chunks, *args, partial, weight=CHUNK, pieces=chunks)
-    total = partial[0]
-    for part in partial[1:]:
-        total += part
-    return total
+    partial = np.zeros((chunks, math.prod(shape)))
+    over(kernel, chunks, *args, partial.reshape(chunks, *shape), weight=weight * CHUNK, pieces=chunks)
+    return np.add.accumulate(partial)[-1].reshape(shape)
 
 
 def marked(mask) -> Array:

@@ -50,7 +50,7 @@ from fluid.numerics.fields import PLAIN, added, copied, places_of
 from fluid.surface.level_set import drain_films
 from fluid.surface.pools import own_shift, pools
 from kernels.decorators import kernel, ranged, released
-from kernels.threads import found_over, over, owning, owns_any, reach_of_cells
+from kernels.threads import CHUNK, found_over, over, owning, owns_any, reach_of_cells, summed
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
@@ -244,10 +244,8 @@ def _shift(first, column, entry, diagonal, residual, tolerance, most):
     for _ in range(most):
         if rz <= goal or rz <= 0.0:
             break
-        over(_product, n, first, column, entry, diagonal, p, Ap)
-        alpha = rz / _dot(p, Ap)
-        over(_stepped, n, alpha, diagonal, Ap, r, z, weight=DIVIDED)
-        new = _dot(r, z)
+        alpha = rz / float(summed(_product, n, (), first, column, entry, diagonal, p, Ap))
+        new = float(summed(_stepped, n, (), alpha, diagonal, Ap, r, z, weight=DIVIDED))
         # as much of the last step as a line to the goal would take: taken as a whole, one step more or less by the last
         # digit of r·z changes x by the tolerance
         taken = alpha if new >= goal else alpha * (rz - goal) / (rz - new)
@@ -268,26 +266,30 @@ def _first_way(diagonal, r, z):
 
 
 @ranged
-def _product(begin, end, first, column, entry, diagonal, p, Ap):
-    for r in range(begin, end):
-        total = diagonal[r] * p[r]
-        for s in range(first[r], first[r + 1]):
-            total += entry[s] * p[column[s]]
-        Ap[r] = total
-
-
-@kernel
-def _dot(a, b):
-    return np.dot(a, b)
+def _product(begin, end, first, column, entry, diagonal, p, Ap, partial):
+    """A p (n,), and p·A p."""
+    for c in range(begin, end):
+        dot = 0.0
+        for r in range(c * CHUNK, min((c + 1) * CHUNK, p.shape[0])):
+            total = diagonal[r] * p[r]
+            for s in range(first[r], first[r + 1]):
+                total += entry[s] * p[column[s]]
+            Ap[r] = total
+            dot += p[r] * total
+        partial[c] = dot
 
 
 @ranged
-def _stepped(first, last, share, diagonal, Ap, r, z):
-    """r - share Ap and z = r/diagonal of conjugate gradients, in place."""
-    for k in range(first, last):
-        i = np.uint64(k)
-        r[i] -= share * Ap[i]
-        z[i] = r[i] / diagonal[i]
+def _stepped(begin, end, share, diagonal, Ap, r, z, partial):
+    """r - share Ap and z = r/diagonal of conjugate gradients, in place, and r·z."""
+    for c in range(begin, end):
+        dot = 0.0
+        for k in range(c * CHUNK, min((c + 1) * CHUNK, r.shape[0])):
+            i = np.uint64(k)
+            r[i] -= share * Ap[i]
+            z[i] = r[i] / diagonal[i]
+            dot += r[i] * z[i]
+        partial[c] = dot
 
 
 @ranged
