@@ -200,7 +200,7 @@ def _steps(
         raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
-        _report_verdict(case, verdict(), figures, directory, reporter, coupling.coupled)
+        _report_verdict(case, verdict(), figures, schedule.end, directory, reporter, coupling.coupled)
 
 
 def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
@@ -225,10 +225,10 @@ def _note_air(coupling, figures: dict, reporter) -> None:
 
 
 def _report_verdict(
-    case: Case, reported: dict | None, figures: dict, directory, reporter, is_coupled: bool
+    case: Case, reported: dict | None, figures: dict, end: float, directory, reporter, is_coupled: bool
 ) -> None:
-    """Write the verdict to run.json and the log, however the run ends, with the reasons to doubt its loads."""
-    from coupler.verdict.words import sentences, unreached
+    """Write the verdict to run.json and the log, however the run ends, with the reasons to doubt it and its loads."""
+    from coupler.verdict.words import sentences, unfinished, unreached
 
     doubts = [*thin_remarks(case), *thin_water_remarks(case)]
     doubts += [in_all(figures["tank_top"])] if "tank_top" in figures else []
@@ -236,8 +236,11 @@ def _report_verdict(
         from coupler.run.trapped_air import opened_in_all
 
         doubts.append(opened_in_all(figures["air_opened"]))
-    if reported is not None and is_coupled and figures["steps"]:
-        doubts += filter(None, [unreached(reported, figures["time"])])
+    time = figures.get("time", 0.0)  # of the last complete step
+    if reported is not None and not _reached(time, end):
+        doubts.append(unfinished(time, end))
+    elif reported is not None and is_coupled and figures["steps"]:
+        doubts += filter(None, [unreached(reported, time)])
     directory.record(doubts=doubts)
     if reported is not None:
         directory.record(verdict=reported)
@@ -390,7 +393,7 @@ def _stop_reason(clock: Clock, limits: Limits, reporter) -> str | None:
     """The reason why the run is to end now, or None."""
     if limits.cpu_seconds is not None and clock.here() > limits.cpu_seconds:
         return (
-            f"the run has used {clock.here():.0f} s of processor time; limit {limits.cpu_seconds:.0f} s "
+            f"the run has used {clock.here():.1f} s of processor time; limit {limits.cpu_seconds:g} s "
             "(limits.cpu_seconds). Raise it, or use a coarser tank.cell"
         )
     return reporter.stop_requested()

@@ -37,6 +37,14 @@ def unreached(reported: dict, time: float) -> str | None:
     )
 
 
+def unfinished(time: float, end: float) -> str:
+    """A sentence for a run that ended at time [s], before its end [s]: what broke until then is a lower bound."""
+    return (
+        f"the run ended early, at t = {moment_of(time)} of {moment_of(end)}: "
+        "this verdict says nothing about what comes later"
+    )
+
+
 def name_of(reported: dict, name: str) -> str:
     """A wall, floor or storey in words."""
     return in_words(name, {body["name"] for body in reported["bodies"]})

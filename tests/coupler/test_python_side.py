@@ -201,6 +201,15 @@ def test_a_limit_of_the_case_raises(tmp_path):
         dry().set("limits.cpu_seconds", 1e-6).run(tmp_path / "run")
 
 
+def test_the_verdict_of_a_run_that_ends_early_says_until_when(ran, tmp_path):
+    """A structure stands at the start of any run: without the time, that reads like the answer."""
+    run = dry().run(tmp_path / "run", stop=lambda step: step.number == 2)
+    (doubt,) = run.summary["figures"]["doubts"]
+    assert doubt.startswith("the run ended early, at t = 8 ms of ")
+    whole, _ = ran
+    assert not whole.summary["figures"]["doubts"]
+
+
 # ---- reading a run
 
 
