@@ -157,6 +157,21 @@ def test_without_the_optional_packages_the_way_to_get_them_is_reported(tmp_path)
     assert "`./surgebreak test` of the checkout brings it" in done.stderr
 
 
+def test_without_a_checkout_no_tests_of_other_packages_are_run(tmp_path):
+    """pytest in site-packages collects what lies there, the tests of pip among them."""
+    code = (
+        "import sys, pathlib, coupler.commands.cli as cli, coupler.program.provenance as provenance\n"
+        f"provenance.ROOT = pathlib.Path({str(tmp_path)!r})\n"
+        "sys.argv = ['surgebreak', 'test']\n"
+        "cli.main()"
+    )
+    (tmp_path / "test_of_another.py").write_text("def test_it():\n    pass\n", encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "no checkout, so there are no tests to run" in done.stderr
+    assert "passed" not in done.stdout
+
+
 def test_pytest_gets_its_words(tmp_path):
     """`test` passes options on and returns pytest's own code: 5 when nothing was collected."""
     done = surgebreak("test", "tests/coupler/test_cli.py", "--collect-only", "-k", "no_such_test")
