@@ -8,6 +8,7 @@ import pytest
 
 from coupler.commands.explain_run import explanation_of_run
 from coupler.commands.report.command import report
+from coupler.commands.view.__main__ import summary as summary_for_pictures
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.results.history import BadTable, read_history
 from coupler.run.array_file import write_arrays
@@ -20,11 +21,11 @@ JUNK = ["[]", "{}", "null", "1", '"x"', "", "\0", "{", '{"status": 1}', "[" * 10
 
 
 def refusals(run):
-    """What resume, explain and report say of a run that none of them can use."""
+    """What resume, explain, report and render say of a run that none of them can use."""
     reported = []
-    for use in (lambda: prepare(run), lambda: explanation_of_run(run), lambda: report(run, False)):
+    for use in (prepare, explanation_of_run, lambda run: report(run, False), summary_for_pictures):
         with pytest.raises(SurgebreakError) as refusal:
-            use()
+            use(run)
         assert refusal.value.exit_code == ExitCode.BAD_CASE
         reported.append(str(refusal.value))
     return reported

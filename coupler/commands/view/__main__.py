@@ -2,7 +2,6 @@
 
 import argparse
 import ctypes
-import json
 import os
 import sys
 import time
@@ -12,6 +11,7 @@ from coupler.commands.view.camera import VIEWS
 from coupler.program.errors import FULL, ExitCode, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import was_killed
+from coupler.run.summary import FILE_NAME, read_summary
 
 INSIDE = "inside"
 
@@ -185,9 +185,8 @@ def make(options):
 
 
 def summary(run):
-    """What run.json says; nothing where there is none."""
-    path = run / "run.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    """What run.json says; nothing where there is none.  Raises NoRun where no run wrote it."""
+    return read_summary(run) if (run / FILE_NAME).exists() else {}
 
 
 def report(action, *given, **options):
