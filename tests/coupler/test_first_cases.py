@@ -10,6 +10,7 @@ from coupler.checks.read_case import load
 from coupler.commands.cli import app
 from coupler.program.errors import UnknownName
 from coupler.program.provenance import ROOT
+from tests.coupler.test_cli import surgebreak
 
 
 @pytest.mark.parametrize("name", FIRST_CASES)
@@ -28,6 +29,18 @@ def test_the_start_page_shows_the_case_that_init_writes(tmp_path):
     for wrong in ("cell =", "density ="):
         line = next(i for i, text in enumerate(written.splitlines(), 1) if text.startswith(wrong))
         assert f"first/case.toml:{line}: " in page
+
+
+def test_the_start_page_shows_what_check_and_run_report(tmp_path):
+    """Who follows the page compares these lines with his own."""
+    write_first_case(tmp_path / "first")
+    page = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    for command in ("check", "run"):
+        told = {line.strip() for line in surgebreak(command, tmp_path / "first").stdout.splitlines()}
+        shown = page.split(f"**`{command}` reports**")[1].split("```text\n")[1].split("```")[0]
+        for line in shown.replace("\n  ", " ").splitlines():
+            if not line.startswith("memory"):  # that of the process so far and what is computed
+                assert line in told
 
 
 def test_answers_stand_in_the_case_with_their_units(tmp_path):
