@@ -59,7 +59,7 @@ class Time(Section):
     checkpoint_every: Annotated[float, InSI("s", ge=0)] | None = Field(
         None,
         description="time between two checkpoints, from which `surgebreak resume` continues; absent: a tenth of the "
-        "end time; 0: none, also when the run is stopped",
+        "end time, and ten minutes of wall time at most; 0: none, also when the run is stopped",
     )
 
 

@@ -7,6 +7,8 @@ balance, the lengths of the result files, figures and processor time, and identi
 from __future__ import annotations
 
 import json
+import math
+import time
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -22,6 +24,8 @@ from coupler.run.fingerprint import differences, file_digests, program, scene_pa
 
 FOLDER = "checkpoints"
 KEPT = 2
+LONGEST = 600.0
+"""Wall time [s] that a kill may take from a run whose case gives no interval: a tenth of a long run is hours."""
 LAYOUT = 8
 """Number of the names, kinds and columns of the arrays; checkpoints of another one are refused."""
 UNSET = (
@@ -114,13 +118,23 @@ class State:
 class Checkpoints:
     """Writes the checkpoints of a run, of which the newest KEPT are kept.
 
-    directory: of the run · every [s] · case: effective · scene, recorder: what is saved
+    directory: of the run · every [s] of the run · case: effective · scene, recorder: what is saved ·
+    longest: wall time [s] after which one is due anyway
     """
 
-    def __init__(self, directory: Path, every: float, case: dict, schedule: Schedule, scene, recorder):
+    def __init__(
+        self,
+        directory: Path,
+        every: float,
+        case: dict,
+        schedule: Schedule,
+        scene,
+        recorder,
+        longest: float = math.inf,
+    ):
         self.folder = directory / FOLDER
         self.folder.mkdir(exist_ok=True)
-        self.every, self.scene, self.recorder = every, scene, recorder
+        self.every, self.longest, self.scene, self.recorder = every, longest, scene, recorder
         self._about = {
             "layout": LAYOUT,
             "case": case,
@@ -131,9 +145,12 @@ class Checkpoints:
         }
         self._last = scene.coupling.time
         self._next = next_multiple(self._last, every)
+        self._clock = time.monotonic()
 
     def due(self) -> bool:
-        """Whether the interval since the last checkpoint has passed."""
+        """Whether one of the intervals since the last checkpoint has passed."""
+        if time.monotonic() - self._clock >= self.longest:
+            return True
         return self.scene.coupling.time >= self._next * (1.0 - 1e-12)
 
     def write(self, figures: dict, cpu_seconds: dict[str, float]) -> None:
@@ -155,6 +172,7 @@ class Checkpoints:
         write_arrays(self.folder / state.name, state.arrays, state.about, UNSET)
         self._last = state.time
         self._next = next_multiple(state.time, self.every)
+        self._clock = time.monotonic()
         for old in listed(self.folder)[KEPT:]:
             old.unlink()
 

@@ -281,9 +281,10 @@ def _checkpoints(case: Case, scene: Scene, directory, recorder: Recorder, schedu
     every = checkpoint_interval(case)
     if every == 0.0:
         return None
-    from coupler.run.checkpoint import Checkpoints
+    from coupler.run.checkpoint import LONGEST, Checkpoints
 
-    return Checkpoints(directory.path, every, effective(case), schedule, scene, recorder)
+    longest = LONGEST if case.time.checkpoint_every is None else np.inf
+    return Checkpoints(directory.path, every, effective(case), schedule, scene, recorder, longest)
 
 
 def _save(checkpoints, directory, figures: dict, clock: Clock) -> None:

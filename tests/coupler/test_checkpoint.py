@@ -8,6 +8,8 @@ import sys
 import numpy as np
 import pytest
 
+import coupler.run.checkpoint
+from coupler.results.history import read_history
 from coupler.results.storage import NotFinite
 from coupler.run.checkpoint import FOLDER, Checkpoint, listed
 from coupler.run.resume import CannotResume, prepare
@@ -16,6 +18,20 @@ from tests.coupler.resumed import DRY, begin, check_same, directory_of, go_on
 
 def test_two_checkpoints_stay(dry):
     assert [Checkpoint.read(path).time for path in listed(dry / FOLDER)] == pytest.approx([0.1, 0.08])
+
+
+def test_a_long_run_keeps_what_it_has_computed_in_any_ten_minutes(dry, tmp_path, monkeypatch):
+    """A tenth of the end is hours where a run takes a day. An interval of the case is kept to."""
+    monkeypatch.setattr(coupler.run.checkpoint, "LONGEST", 0.0)
+    by_default = "\n".join(line for line in DRY.splitlines() if "checkpoint_every" not in line)
+    often = begin(tmp_path / "often", by_default, tmp_path / "run")
+    last = len(read_history(often / "history" / "structure.csv")["time"])
+    assert [int(path.stem) for path in listed(often / FOLDER)] == [last, last - 1]
+    listed(often / FOLDER)[0].unlink()
+    go_on(often)
+    check_same(dry, often)
+    own = begin(tmp_path / "own", DRY, tmp_path / "own_run")
+    assert [path.stem for path in listed(own / FOLDER)] == [path.stem for path in listed(dry / FOLDER)]
 
 
 def damage_tear(path):
