@@ -9,9 +9,9 @@ NEVER = np.nan
 RULES = Rules(moved=0.1, damaged_joints=0.0, collapsed_weight=0.5)
 
 
-def two_walls(moved=(0.0,) * 4, broken=(NEVER,) * 4):
+def two_walls(moved=(0.0,) * 4, broken=(NEVER,) * 4, thickness=(1.0,) * 4):
     """Two walls of two blocks each, 1 m thick; joints: within either wall, between the two, and to the ground."""
-    blocks = Blocks(np.array([1.0, 3.0, 2.0, 2.0]), np.ones(4), np.array(moved))
+    blocks = Blocks(np.array([1.0, 3.0, 2.0, 2.0]), np.array(thickness), np.array(moved))
     joints = Joints(
         np.array([0, 2, 1, 0]), np.array([1, 3, 2, -1]), np.array([1.0, 2.0, 4.0, 3.0]), np.array(broken)
     )
@@ -54,6 +54,13 @@ def test_collapse_goes_by_the_weight_that_left_its_place_and_not_by_the_number_o
 
 def test_a_block_that_moved_less_than_the_share_of_its_thickness_is_in_its_place():
     assert two_walls(moved=(0.0, 0.099, 0.0, 0.0))[0].state is State.STANDS
+
+
+def test_each_block_is_measured_by_its_own_thickness():
+    """A way of 0.1 m takes a board of 0.2 m out of its place and leaves a block of 2 m in it."""
+    left, right = two_walls(moved=(0.1, 0.1, 0.1, 0.1), thickness=(0.2, 2.0, 0.2, 0.2))
+    assert (left.blocks_moved, left.weight_moved) == (1, pytest.approx(0.25))
+    assert right.blocks_moved == 2
 
 
 def test_broken_joints_alone_are_a_collapse_only_where_the_case_says_so():
