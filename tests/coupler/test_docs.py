@@ -85,6 +85,36 @@ def test_commands_and_their_options_exist(page):
     assert lost == []
 
 
+def test_the_readme_states_the_benchmarks_of_the_page():
+    """Counts, and each measured and computed value as the README rounds it."""
+    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    section = (
+        (ROOT / "README.md")
+        .read_text(encoding="utf-8")
+        .split("## How far it has been checked\n")[1]
+        .split("\n## ")[0]
+    )
+    passed, of, seconds = re.search(r"(\d+) of (\d+) cases pass.*took (\d+) CPU s", page).groups()
+    words = " ".join(section.split())
+    assert f"compares {of} cases" in words
+    assert f"({seconds} CPU s;" in words
+    assert f"{passed} of them pass" in words
+    case, rows = (
+        "",
+        re.findall(r"^\|(.*?)\| (.*?) \| ([\d.]+) \| ([\d.]+) \|$", section, flags=re.MULTILINE),
+    )
+    assert len(rows) == 9
+    for experiment, quantity, *shown in rows:
+        case = (re.findall(r"\[(P\d\d)\]", experiment) or [case])[0]
+        text = page.split(f"\n## {case}:")[1].split("\n## ")[0]
+        computed, measured = re.search(
+            rf"^\| {re.escape(quantity)} \| (\S+) \| (\S+) \|", text, re.MULTILINE
+        ).groups()
+        for value, stated in zip((measured, computed), shown):
+            decimals = len(stated.partition(".")[2])
+            assert f"{float(value):.{decimals}f}" == stated, quantity
+
+
 def documented(title):
     """Names in the first column of the table with this head in docs/results.md."""
     text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
