@@ -36,6 +36,8 @@ def test_the_first_break_is_the_earliest_of_the_group():
     left, right = two_walls(broken=(2.0, 0.5, NEVER, 1.0))
     assert (left.first_break, left.first_joint) == (1.0, 3)
     assert (right.first_break, right.first_joint) == (0.5, 1)
+    left, _ = two_walls(broken=(0.5, NEVER, NEVER, NEVER))
+    assert (left.first_break, left.first_joint) == (0.5, 0)
 
 
 def test_a_joint_with_the_ground_belongs_to_its_block_alone():
@@ -49,7 +51,8 @@ def test_collapse_goes_by_the_weight_that_left_its_place_and_not_by_the_number_o
     heavy = two_walls(moved=(0.0, 0.2, 0.0, 0.0))[0]
     assert (light.state, heavy.state) == (State.DAMAGED, State.COLLAPSED)
     assert (light.weight_moved, heavy.weight_moved) == pytest.approx((0.25, 0.75))
-    assert heavy.farthest_block == 1
+    assert (light.farthest, light.farthest_block) == (0.2, 0)
+    assert (heavy.farthest, heavy.farthest_block) == (0.2, 1)
 
 
 def test_a_block_that_moved_less_than_the_share_of_its_thickness_is_in_its_place():
