@@ -2,7 +2,8 @@
 
 read_case                                    from a case directory to a checked case
 case                                         sections that need each other, names that must exist
-places, motion, joints, softness, water      bodies, prescribed motions, joints, contacts, walls and inflows
+places, motion, joints, softness             bodies, prescribed motions, joints, contacts
+water, inflows                               walls and water too thin for the cells; inflows and seas
 gauges                                       gauges: places, and what they would read
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
 sides                                        loose blocks that rub on the sides of a slice
