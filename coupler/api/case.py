@@ -12,8 +12,8 @@ from coupler.api.run import Run
 from coupler.api.step import Step
 from coupler.case import toml_text
 from coupler.case.case import effective
-from coupler.checks.case import remarks
 from coupler.checks.read_case import ABSENT, CaseFile, changed, from_text, load, table_of
+from coupler.checks.remarks import remarks
 from coupler.program.errors import SurgebreakError
 from coupler.run.directory import RunDirectory
 

@@ -2,6 +2,8 @@
 
 read_case                                    from a case directory to a checked case
 case                                         sections that need each other, names that must exist
+remarks                                      what is allowed but should be known before the run
+thin_walls                                   bodies too thin for single covers
 places, motion, joints, softness             bodies, prescribed motions, joints, contacts
 water, inflows                               walls and water too thin for the cells; inflows and seas
 gauges                                       gauges: places, and what they would read

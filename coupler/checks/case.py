@@ -9,36 +9,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 
-import numpy as np
-
-from coupler.case.case import Case, Tank
-from coupler.case.materials import material_remarks
+from coupler.case.case import Case
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath, Problem
 from coupler.case.verdict import Verdict
 from coupler.checks.air import air_problems
-from coupler.checks.gauges import gauge_problems, gauge_remarks
+from coupler.checks.gauges import gauge_problems
 from coupler.checks.joints import joint_problems, pair_problems, uplift_problems
 from coupler.checks.motion import motion_problems
-from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
-from coupler.checks.sides import side_remarks
-from coupler.checks.softness import softness_remarks
+from coupler.checks.places import frame_problems, opening_problems, place_problems
 from coupler.checks.tables import table_problems
-from coupler.checks.unit_slips import unit_remarks
-from coupler.checks.water import water_problems, water_remarks
-from coupler.geometry.bodies import Body
-from coupler.geometry.cell_sizes import has_equal_cells, places_in, widest_cell
+from coupler.checks.water import water_problems
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
-from coupler.geometry.tank_mesh import is_measured, mesh_remarks
+from coupler.geometry.tank_mesh import is_measured
 from coupler.geometry.terrain.land import land_problems
-from coupler.geometry.town import town_problems, town_remarks
+from coupler.geometry.town import town_problems
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import Divisions
 
-FALLEN = 0.01
-"""Share of its strength that a law may carry at the opening at failure without a remark."""
 SHAPES = {"size": "box", "diameter": "sphere"}
 """Shape of a block by the key that gives it, where the block needs a centre."""
 
@@ -69,199 +59,6 @@ def _study(case: Case) -> Iterator[Problem]:
         from coupler.case.sweep_names import sweep_problems
 
         yield from sweep_problems(case.sweep)
-
-
-def remarks(case: Case) -> list[str]:
-    """Remarks on what is allowed but should be known before the run."""
-    found = [
-        *thin_remarks(case),
-        *_contact_remarks(case),
-        *_pass_remarks(case),
-        *softness_remarks(case),
-        *water_remarks(case),
-        *material_remarks(case),
-        *_joint_remarks(case),
-        *_loose_remarks(case),
-        *side_remarks(case),
-        *_ramp_remarks(case),
-        *town_remarks(case),
-        *_drawing_remarks(case),
-    ]
-    found += mesh_remarks(case.tank) if case.tank is not None else []
-    return [
-        *found,
-        *unit_remarks(case),
-        *gauge_remarks(case),
-    ]
-
-
-def _drawing_remarks(case: Case) -> Iterator[str]:
-    """Those of drawings, whose modules are loaded only where there is one."""
-    if case.structure is not None and case.structure.drawing:
-        from coupler.geometry.drawing.drawing import drawing_remarks
-
-        yield from drawing_remarks(case)
-
-
-def thin_remarks(case: Case) -> Iterator[str]:
-    """Bodies too thin for single covers, reported once for the thinnest.
-
-    On fixed walls 1, 1.2, 1.4 and 1.6 cells thick, whose middle stood 0.05 of a cell off a plane of the mesh, 0.6 m of
-    still water on cells of 0.1 m exerted 0.55, 0.62, 0.84 and 0.91 of its force after 0.2 s, and passed through; other
-    places gave up to 0.15 more. On a wall of 1.9 cells it exerted all of it."""
-    if case.tank is None or case.water is None or case.water.covers != "single":
-        return
-    thin: dict[str, tuple[float, float, float]] = {}
-    for name, width, cell, divides in _widths(case):
-        if width < (2.0 * (1.0 - 1e-9) if divides else 1.0) * cell:
-            thin[name] = min(thin.get(name, (np.inf, 0.0, 0.0)), (width / cell, width, cell))
-    if thin:
-        name, (_, width, cell) = min(thin.items(), key=lambda item: item[1])
-        below, lost = "a cell", "most of the load can be missing"
-        if width >= cell:
-            below, lost = "two cells", "nearly half of the load can be missing, and water pass through"
-        more = sum(share < (1.0 if width < cell else 2.0) for share, *_ in thin.values()) - 1
-        others = f" (and {more} more are thinner than {below})" if more else ""
-        yield (
-            f"{name} is {width:g} m thick, thinner than {below} ({cell:.3g} m){others}: with single covers the water "
-            f"on its two sides is one field there, and {lost}; write "
-            'water.covers = "multiple" for the whole load'
-        )
-
-
-def _widths(case: Case) -> Iterator[tuple[str, float, float, bool]]:
-    """Name, smallest width [m] and largest size [m] of the cells across it, of solids, walls and floors as wholes,
-    which may have water on one side alone (True), and of all other blocks (False)."""
-    for _, name, body in solid_bodies(case):
-        for width, way in _across(case.tank, body):
-            yield name, width, widest_cell(case.tank, places_in(body), way), True
-    equal = has_equal_cells(case.tank)
-    for part in parts_of(case):
-        spec = getattr(case.structure, str(part.path[1]))[part.path[2]]
-        if part.path[1] in ("wall", "building"):
-            bodies = [] if equal else [Body.of_block(block) for block in part.blocks]
-            places = [place for body in bodies for place in (*body.vertices, body.vertices.mean(axis=0))]
-            for width, way in _thin_ways(case.tank, part.path[1], spec):
-                yield part.name, width, widest_cell(case.tank, np.array(places), way), True
-        else:
-            for body in map(Body.of_block, part.blocks):
-                middle = body.vertices.mean(axis=0, keepdims=True)
-                for width, way in _across(case.tank, body):
-                    yield part.name, width, widest_cell(case.tank, middle, way), False
-
-
-def _across(tank: Tank, body: Body) -> Iterator[tuple[float, np.ndarray]]:
-    """The smallest width [m] of a body and the unit direction (3,) of it, if any, among those in which water can be on
-    its two sides: not from side to side of the tank, as across a slice that it fills."""
-    low, high = body.bounds()
-    slack = 1e-6 * np.subtract(tank.upper, tank.lower)
-    spanned = (low <= np.add(tank.lower, slack)) & (high >= np.subtract(tank.upper, slack))
-    ways = body.normals[(np.abs(body.normals)[:, spanned] < 1.0 - 1e-9).all(axis=1)]
-    if len(ways):
-        widths = np.ptp(body.vertices @ ways.T, axis=0)
-        yield float(widths.min()), ways[widths.argmin()]
-
-
-def _thin_ways(tank: Tank, kind, spec) -> Iterator[tuple[float, np.ndarray]]:
-    """Widths [m] of a wall, or of the walls and floors of a building, and the unit directions (3,) across them."""
-    c, s = np.cos(spec.turn), np.sin(spec.turn)
-    ways = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    if kind == "wall":
-        centre = np.add(spec.lower, np.multiply(spec.size, 0.5))
-        yield from _across(tank, Body.box(centre, spec.size, ways.T))
-    else:
-        yield spec.wall_thickness, ways[0]
-        yield spec.wall_thickness, ways[1]
-        yield spec.floor_thickness or spec.wall_thickness, ways[2]
-
-
-def _joint_remarks(case: Case) -> Iterator[str]:
-    j = case.joints
-    if j is None:
-        return
-    from yade_scripts.blocks.quadrature import enough
-
-    if j.points != "auto" and j.points < len(enough(j.closing_ratio, 3)):
-        yield (
-            f"joints.points = {j.points} with joints.closing_ratio = {j.closing_ratio:g}: too few for the strength in "
-            f"bending (3 are 8 % weak at 10, 16 % at 100); 'auto' takes {len(enough(j.closing_ratio, 3))} or more"
-        )
-    yield from _law_remarks(case)
-
-
-def _law_remarks(case: Case) -> Iterator[str]:
-    """Laws from outside that do not fall to zero before a joint lets go."""
-    from yade_scripts.joints import laws
-    from yade_scripts.joints.outside_laws import carried_at_failure
-
-    j = case.joints
-    used = {j.law: j.peak} | {pair.law: pair.peak for pair in j.pair if pair.law}
-    own = laws.shipped()
-    for name, peak in used.items():
-        carried = 0.0 if name in own else carried_at_failure(laws.find(name), peak)
-        if carried > FALLEN:
-            yield (
-                f"law '{name}' does not fall to zero: at opening_at_failure it still carries {carried:.0%} of its "
-                "strength, which is gone at once there: the energy that the joint took until then is counted, but the "
-                "drop strikes its blocks. Let secant(1, p) be 0"
-            )
-
-
-def _loose_remarks(case: Case) -> Iterator[str]:
-    """Joints that are absent: walls and buildings are rarely meant to be dry-laid."""
-    if case.structure is None or case.joints is not None:
-        return
-    for part in (*case.structure.wall, *case.structure.building):
-        yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
-
-
-def _ramp_remarks(case: Case) -> Iterator[str]:
-    """Loose blocks under water without their weight: the voussoirs of an arch that stands flew apart within 0.12 s of a
-    ramp of 1 s."""
-    if (
-        case.structure is None
-        or case.structure.start != "ramp"
-        or case.joints is not None
-        or case.water is None
-    ):
-        return
-    fills = [(np.asarray(fill.lower), np.asarray(fill.upper)) for fill in case.water.fill]
-    for part in parts_of(case):
-        free = [block.world_vertices() for block in part.blocks if not block.fixed]
-        if any(
-            (x.min(axis=0) < upper).all() and (x.max(axis=0) > lower).all()
-            for x in free
-            for lower, upper in fills
-        ):
-            yield (
-                f"loose blocks of '{part.name}' begin in water, which lifts them in full from the start, while "
-                f"start = 'ramp' gives them their weight over {case.structure.ramp:g} s: they rise, and the part comes "
-                "apart; write start = 'sudden'"
-            )
-
-
-def _contact_remarks(case: Case) -> Iterator[str]:
-    if case.structure is not None and case.contact is None:
-        yield (
-            "there is no section [contact]: blocks whose joints break pass through one another, the ground and the "
-            "sides of the tank; with [joints] an empty section [contact] will do"
-        )
-
-
-def _pass_remarks(case: Case) -> Iterator[str]:
-    """One pass where blocks are lighter than the water: P58 has the growth of their vibration."""
-    if case.structure is None or case.water is None or case.coupling.passes > 1:
-        return
-    driven = {motion.block for motion in case.motion}
-    free = [b for part in parts_of(case) for b in part.blocks if not b.fixed and b.name not in driven]
-    lightest = min(free, key=lambda block: block.density, default=None)
-    if lightest is not None and lightest.density < case.water.density:
-        yield (
-            f"coupling.passes = 1 with '{lightest.name}' of {lightest.density:g} kg/m3, lighter than the water "
-            f"({case.water.density:g} kg/m3): with a single pass such blocks miss the water's work, their vibration "
-            "can grow, and limits.energy_error may end the run; leave coupling.passes at 2, which is stable, or give "
-            "a short time.step_max"
-        )
 
 
 # ---------------------------------------------------------------- sections

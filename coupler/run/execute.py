@@ -9,8 +9,8 @@ import numpy as np
 
 from coupler.case.case import Case, modules
 from coupler.checks.bores import bores, in_words
-from coupler.checks.case import remarks
 from coupler.checks.read_case import CaseFile
+from coupler.checks.remarks import remarks
 from coupler.geometry.parts import parts_of
 from coupler.program import arithmetic
 from coupler.program.errors import ExitCode

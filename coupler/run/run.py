@@ -10,7 +10,8 @@ import numpy as np
 from coupler.case.case import Case, effective
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.bores import bores
-from coupler.checks.case import remarks, thin_remarks
+from coupler.checks.remarks import remarks
+from coupler.checks.thin_walls import thin_remarks
 from coupler.checks.water import thin_water_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode

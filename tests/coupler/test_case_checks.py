@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from coupler.case.case import Case
-from coupler.checks.case import problems, remarks, thin_remarks
+from coupler.checks.case import problems
+from coupler.checks.remarks import remarks
+from coupler.checks.thin_walls import thin_remarks
 from coupler.geometry.bodies import Body, overlap_depth, rotation_matrix
 from coupler.geometry.tank_mesh import measured
 from yade_scripts.blocks.block import Block

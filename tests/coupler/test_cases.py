@@ -4,8 +4,8 @@ import tomllib
 
 import pytest
 
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.program.provenance import ROOT
 from coupler.results.expected import TAKE
 from coupler.run.forecast import forecast

@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 from coupler.case.case import Case
 from coupler.case.structure import BlockFile, Drawing
-from coupler.checks.case import remarks
+from coupler.checks.remarks import remarks
 from coupler.commands.blocks.command import write_bodies
 from coupler.geometry.block_files import blocks_from_file
 from coupler.geometry.bodies import Body

@@ -13,8 +13,8 @@ import pytest
 from coupler.case.inflow_records import RecordError, levels_of, record_of
 from coupler.case.structure import BlockFile
 from coupler.case.water import RecordInflow
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.commands.explain_run import explanation_of_run
 from coupler.commands.report.command import report
 from coupler.geometry.block_files import blocks_from_file

@@ -4,8 +4,8 @@ import pytest
 
 from coupler.case.docs import explanation
 from coupler.case.materials import PRESETS
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.program.errors import BadCase
 
 CASE = """

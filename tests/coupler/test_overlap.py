@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.checks.softness import softness_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode

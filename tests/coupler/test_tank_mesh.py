@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.geometry.tank_mesh import basin_edges, bed_along, floor_along, mean_bed, mesh_of, on_side
 from coupler.program.errors import BadCase
 from coupler.program.provenance import ROOT

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.geometry.footprints import best_rectangle, epsg_code, read_footprints
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of

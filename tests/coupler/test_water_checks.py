@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from coupler.case.case import modules
-from coupler.checks.case import problems, remarks
+from coupler.checks.case import problems
+from coupler.checks.remarks import remarks
 from coupler.geometry.tank_mesh import measured
 from coupler.scene.build import build
 from coupler.scene.side_energy import coming_energy

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import surgebreak
-from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.checks.remarks import remarks
 from coupler.program.provenance import ROOT
 from yade_scripts.joints import laws, outside_laws
 from yade_scripts.joints.cohesion import CohesiveLaw, JointParameters
