@@ -28,6 +28,14 @@ def test_three_runs_tell_the_order_without_the_limit(p, sizes, limit):
     assert three_run_order(sizes[::-1], values[::-1]) == pytest.approx(p, rel=1e-3)  # in any order
 
 
+def test_the_finest_runs_decide_where_a_coarse_one_is_not_yet_in_the_range():
+    """Of four runs the coarsest is far off e = h²; the order is that of the two, and of the three, finest."""
+    sizes = np.array([0.1, 0.8, 0.4, 0.2])
+    errors = np.where(sizes > 0.5, 9.0, sizes**2)
+    assert last_slope(sizes, np.where(sizes > 0.3, 9.0, sizes**2)) == pytest.approx(2.0)
+    assert three_run_order(sizes, 7.0 + errors) == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.0, 1.0), (1.0, 2.0, 2.0)])
 def test_runs_that_do_not_approach_a_limit_have_no_order(values):
     assert np.isnan(three_run_order((0.4, 0.2, 0.1), values))
