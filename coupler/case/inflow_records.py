@@ -148,7 +148,7 @@ def levels_of(path: str) -> tuple[Array, Array]:
 def _written_lines(path: str) -> list[tuple[int, str]]:
     """Lines with their numbers, without comments and empty ones; a byte-order mark of a spreadsheet is skipped."""
     try:
-        text = read_text(Path(path), encoding="utf-8-sig")
+        text = read_text(Path(path))
     except BadPath as error:
         raise RecordError(f"{path}: {error}") from error
     return [

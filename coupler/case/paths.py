@@ -56,15 +56,16 @@ def check_file(path: Path, most: int | None = None) -> None:
         raise BadPath(f"has {there.st_size / 1e6:.0f} MB; at most {most / 1e6:.0f} MB are read")
 
 
-def read_text(path: Path, encoding: str = "utf-8", most: int = MOST_BYTES) -> str:
-    """The text of an ordinary file. Raises BadPath, whose message goes on after the path."""
+def read_text(path: Path, most: int = MOST_BYTES) -> str:
+    """The text of an ordinary file, without the byte order mark that editors and tables of Windows begin UTF-8 with.
+    Raises BadPath, whose message goes on after the path."""
     check_file(path, most)
     try:
         with open(path, "rb") as stream:
             content = stream.read(most + 1)
         if len(content) > most:
             raise BadPath(f"has more than {most / 1e6:.0f} MB, the largest that is read")
-        return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise BadPath(f"not a text in UTF-8 (byte {error.start}); save it as UTF-8") from error
     except OSError as error:

@@ -76,7 +76,7 @@ def read_footprints(path: Path, change: tuple[str, str] | None = None) -> list[F
 
 def _geojson(name: str, path: Path) -> list[Footprint]:
     try:
-        data = json.loads(read_text(path, encoding="utf-8-sig"))
+        data = json.loads(read_text(path))
     except (BadPath, json.JSONDecodeError, RecursionError) as error:
         raise FootprintError(f"{name}: cannot be read as GeoJSON ({briefly(str(error))})") from error
     features = data.get("features") if isinstance(data, dict) else None

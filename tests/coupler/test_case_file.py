@@ -49,6 +49,12 @@ def test_a_good_case_is_in_si(tmp_path):
     assert (case.time.end, case.tank.cell, case.water.fill[0].upper) == (2.0, 0.2, (1.0, 2.0, 1.0))
 
 
+def test_a_case_that_windows_wrote_is_the_same(tmp_path):
+    """Its editors begin UTF-8 with a byte order mark and end lines with two characters."""
+    (tmp_path / "case.toml").write_bytes(WATER.replace("\n", "\r\n").encode("utf-8-sig"))
+    assert effective(load(tmp_path).case) == effective(load(write(tmp_path, WATER)).case)
+
+
 def test_the_effective_case_is_complete_and_reads_back_as_the_same_case(tmp_path):
     """What is stored with the results must be enough to run them again: every default written out, nothing lost."""
     case = load(write(tmp_path, WATER + BLOCKS)).case

@@ -414,7 +414,7 @@ def _cross(u, v) -> Array:
 
 def _text(path: Path) -> str:
     try:
-        return read_text(path, encoding="utf-8-sig", most=MOST_BYTES)
+        return read_text(path, most=MOST_BYTES)
     except BadPath as error:
         raise TerrainError(f"{path.name}: {error}") from error
 
