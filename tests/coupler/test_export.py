@@ -160,6 +160,15 @@ def test_every_block_is_an_object_of_its_name(run, exported):
     np.testing.assert_allclose(every.min(axis=0), [low[0], low[2], -high[1]], atol=1e-5)  # y is up there
 
 
+def test_a_window_without_a_state_is_refused_and_histories_are_whole_in_any(run, tmp_path):
+    """It wrote a collection of no files, and ParaView shows nothing."""
+    for window in ((1.5, 0.5), (3.0, 4.0), (0.1, 0.2)):
+        with pytest.raises(CannotExport, match="no state in between; there are 4, from 0 to 2 s"):
+            export(run, ["vtk"], tmp_path / "out", *window)
+        export(run, ["netcdf"], tmp_path / "tables", *window, tell=lambda text: None)
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_unknown_format_is_refused(run, tmp_path):
     with pytest.raises(CannotExport, match="there are vtk, netcdf, gltf"):
         export(run, ["alembic"], tmp_path, 0.0, 1.0)

@@ -11,7 +11,7 @@ from pathlib import Path
 from coupler.commands.export.stored import keep_if, made_of
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.program.quantities import quantity
-from coupler.results.vtkhdf import UNREADABLE
+from coupler.results.vtkhdf import UNREADABLE, read_times
 from coupler.run.summary import read_summary
 
 FORMATS = ("vtk", "netcdf", "gltf")
@@ -31,12 +31,28 @@ def export(run: Path, formats: list[str], to: Path | None, begin: float, end: fl
     if wrong:
         raise CannotExport(f"--format {wrong[0]}: no such format; there are {', '.join(FORMATS)}")
     summary = read_summary(run)
+    if set(formats) - {"netcdf"}:
+        _check_window(run, begin, end)
     title = summary["case"]["case"]["title"]
     folder = to or run / "export"
     folder.mkdir(parents=True, exist_ok=True)
     _begin(folder, summary)
     for name in formats:
         _reported(name, _writer(name, run, folder, title, lambda t: begin <= t <= end), folder, tell)
+
+
+def _check_window(run: Path, begin: float, end: float) -> None:
+    """Raises CannotExport where the run has stored states, and none from begin to end [s]."""
+    for path in filter(Path.exists, (run / "fields.vtkhdf", run / "blocks.vtkhdf")):
+        try:
+            times = read_times(path)
+        except UNREADABLE:
+            return  # the writers say what is wrong with the file
+        if len(times) and not ((times >= begin) & (times <= end)).any():
+            raise CannotExport(
+                f"--from {begin:g} --until {end:g}: no state in between; there are {len(times)}, from {times[0]:g} to "
+                f"{times[-1]:g} s"
+            )
 
 
 def _begin(folder: Path, summary: dict) -> None:
