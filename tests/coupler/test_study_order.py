@@ -1,4 +1,6 @@
-"""Orders of convergence and reductions of synthetic data, whose answers are known."""
+"""Orders of convergence, cheapest settings and reductions of synthetic data, whose answers are known."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coupler.case.study import Quantity
+from coupler.commands.study.cheapest import cheapest
 from coupler.commands.study.order import last_slope, slope, three_run_order
 from coupler.commands.study.reading import Curve, NotRecorded, taken
 from coupler.commands.study.reference import against_curve
@@ -45,6 +48,48 @@ def test_two_runs_or_errors_of_zero_give_no_order_where_there_is_none():
     assert np.isnan(three_run_order((0.2, 0.1), (1.0, 2.0)))
     assert np.isnan(slope((0.2, 0.1), (0.0, 1e-3)))
     assert np.isnan(slope((0.1, 0.1), (1e-2, 1e-3)))
+
+
+def ladder(errors, name="h", cost=lambda size: 1.0 / size):
+    """A plan and outcomes of runs of one ladder, of whose sizes the errors are given; finer runs cost more."""
+    rungs = [SimpleNamespace(ladder=name, curve="", size=size, setting=f"{name}{size}") for size in errors]
+    run = lambda size: SimpleNamespace(cpu_seconds=cost(size))  # noqa: E731
+    found = {
+        rung.setting: SimpleNamespace(
+            run=run(rung.size), readings={"q": SimpleNamespace(error=errors[rung.size])}
+        )
+        for rung in rungs
+    }
+    return rungs, found
+
+
+def cheapest_of(*ladders):
+    """The setting for 5 % of several ladders; None where there is none."""
+    rungs = [rung for rungs, _ in ladders for rung in rungs]
+    found = {setting: outcome for _, outcomes in ladders for setting, outcome in outcomes.items()}
+    plan = SimpleNamespace(rungs=rungs, study=SimpleNamespace(quantity=[SimpleNamespace(name="q")]))
+    (best,) = [c for c in cheapest(plan, found) if c.level == 0.05]
+    return best.rung and best.rung.setting
+
+
+def test_a_coarse_run_that_hits_the_answer_by_chance_is_not_the_cheapest_setting():
+    """1 % at 0.4 means nothing beside 9 % at 0.2. An error of exactly the level is within it."""
+    assert cheapest_of(ladder({0.4: 0.01, 0.2: 0.09, 0.1: 0.05, 0.05: 0.02})) == "h0.1"
+    assert cheapest_of(ladder({0.4: 0.01, 0.2: 0.04, 0.1: 0.03})) == "h0.4"
+    assert cheapest_of(ladder({0.4: 0.2, 0.2: 0.01, 0.1: 0.09})) is None
+
+
+def test_the_finest_run_which_has_no_error_against_itself_takes_nothing_from_coarser_ones():
+    assert cheapest_of(ladder({0.4: 0.09, 0.2: 0.02, 0.1: np.nan})) == "h0.2"
+
+
+def test_each_ladder_is_judged_by_its_own_finer_runs():
+    """A short step that is off says nothing of fine cells; the cheaper of both ladders is taken."""
+    cells = ladder({0.4: 0.09, 0.2: 0.02, 0.1: 0.01})
+    steps = ladder({0.08: 0.09, 0.04: 0.2}, name="dt")
+    assert cheapest_of(cells, steps) == "h0.2"
+    dear = ladder({0.3: 0.01}, name="dt", cost=lambda size: 100.0)
+    assert cheapest_of(cells, dear) == "h0.2"
 
 
 def quantity(**given):
