@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,6 +19,7 @@ from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import is_basin, is_measured, mesh_of, tank_places
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.geometry.terrain.grid import TerrainError
+from coupler.program.memory import memory
 
 Placed = tuple[KeyPath, str, Body]
 
@@ -92,23 +92,20 @@ def _tank(case: Case) -> Iterator[Problem]:
 
 
 def _memory(case: Case) -> Iterator[Problem]:
-    """A mesh too large for the memory of this machine: the system would kill the run without a message."""
+    """A mesh too large for the memory that there is: the system would kill the run without a message."""
     cells, _ = mesh_size(case.tank)
-    needed, there = (
-        bytes_of_cells(cells, case.tank.mesh is not None),
-        os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),
-    )
+    needed, there = bytes_of_cells(cells, case.tank.mesh is not None), memory()
     if needed > there and case.tank.mesh is not None:
         yield (
             ("tank", "mesh"),
-            f"{cells:.3g} cells need about {needed / 1e9:.3g} GB, this machine has {there / 1e9:.0f} GB; mesh coarser",
+            f"{cells:.3g} cells need about {needed / 1e9:.3g} GB, there are {there / 1e9:.3g} GB for it; mesh coarser",
         )
     elif needed > there:
         fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)
         yield (
             ("tank", "cell"),
-            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.3g} GB, this machine has "
-            f"{there / 1e9:.0f} GB; use cells of {1.1 * fits:.2g} m or more",
+            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.3g} GB, there are "
+            f"{there / 1e9:.3g} GB for it; use cells of {1.1 * fits:.2g} m or more",
         )
 
 

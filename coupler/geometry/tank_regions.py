@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
 from coupler.geometry.stretches import axes_of
 from coupler.program.errors import did_you_mean
+from coupler.program.memory import memory
 
 ALL = ("solids", "blocks", "terrain")
 """Names in `around` that stand for everything of a kind."""
@@ -75,13 +75,13 @@ def stretch_problems(case: Case) -> Iterator[Problem]:
 
 
 def too_many(tank: Tank, regions: Regions) -> str | None:
-    """Why a mesh of this size cannot be made on this machine; None if it can. The mesh is not made."""
+    """Why a mesh of this size cannot be made with the memory that there is; None if it can. The mesh is not made."""
     cells = estimated_cells(tank, regions)
-    needed, there = bytes_of_cells(cells), os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    needed, there = bytes_of_cells(cells), memory()
     if needed <= there:
         return None
     return (
-        f"about {cells:.2g} cells, which need {needed / 1e9:.3g} GB; this machine has {there / 1e9:.0f} GB: fewer "
+        f"about {cells:.2g} cells, which need {needed / 1e9:.3g} GB; there are {there / 1e9:.3g} GB for it: fewer "
         "levels, a smaller margin or box, or a larger tank.cell"
     )
 

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import math
 import os
-from pathlib import Path
 
+from coupler.program.control_groups import groups
 from coupler.program.errors import ExitCode, SurgebreakError
 
 VARIABLE = "SURGEBREAK_THREADS"
-CGROUPS = Path("/sys/fs/cgroup")
-OWN_GROUP = Path("/proc/self/cgroup")
 
 
 class BadThreads(SurgebreakError):
@@ -25,7 +23,7 @@ class BadThreads(SurgebreakError):
 def cores() -> int:
     """Cores that this process may use: those it is bound to, fewer where its control group gets less of their time."""
     bound = len(os.sched_getaffinity(0))
-    quota = _quota(CGROUPS, OWN_GROUP)
+    quota = _quota()
     return bound if quota is None else max(1, min(bound, math.floor(quota + 1e-9)))
 
 
@@ -49,10 +47,10 @@ def take_threads(asked: int | None) -> None:
     threads()
 
 
-def _quota(root: Path, own: Path) -> float | None:
+def _quota() -> float | None:
     """Cores' worth of time that the control groups of this process give it, None: no limit."""
     found = []
-    for group in _groups(root, own):
+    for group in groups("cpu"):
         try:
             most, period = (group / "cpu.max").read_text(encoding="ascii").split()
         except (OSError, ValueError):
@@ -60,14 +58,3 @@ def _quota(root: Path, own: Path) -> float | None:
         if most != "max":
             found.append(int(most) / int(period))
     return min(found, default=None)
-
-
-def _groups(root: Path, own: Path) -> list[Path]:
-    """The folders of the group of this process (version 2) and of those around it."""
-    try:
-        lines = own.read_text(encoding="ascii").splitlines()
-    except OSError:
-        return [root]
-    paths = [line.partition("::")[2] for line in lines if line.startswith("0::")]
-    place = root / paths[0].lstrip("/") if paths else root
-    return [place, *(p for p in place.parents if p.is_relative_to(root))]

@@ -115,7 +115,7 @@ def test_a_run_on_finer_cells_goes_on_to_the_last_digit(tmp_path):
         (AROUND + "between = [0, 1]\n", r'between: is for around = \["terrain"\]'),
         (
             BOX.replace("levels = 2", "levels = 6") + AROUND + 'margin = "9 m"\nlevels = 6\n',
-            "GB; this machine has",
+            "GB for it",
         ),
         (SLICES.replace("1.2", "1.7"), r"tank.stretch\[0\].lower: x: 1.7 to 1.6|upper: x: upper \(1.6 m\)"),
         (SLICES.replace('"0.2 m"', '"0.01 m"'), "more slender than 8 to 1"),

@@ -307,20 +307,6 @@ def test_the_command_s_number_counts_before_the_variable_and_that_before_the_cor
         threads.threads()
 
 
-def test_control_groups_give_less_time_than_the_machine_has_cores(tmp_path):
-    """Containers: half of a core counts as one, one and a half as one, and the outer group limits the inner one."""
-    own = tmp_path / "cgroup"
-    own.write_text("0::/outer/inner\n")
-    inner = tmp_path / "root" / "outer" / "inner"
-    inner.mkdir(parents=True)
-    assert threads._quota(tmp_path / "root", own) is None
-    (inner / "cpu.max").write_text("max 100000\n")
-    (inner.parent / "cpu.max").write_text("150000 100000\n")
-    assert threads._quota(tmp_path / "root", own) == 1.5
-    (inner / "cpu.max").write_text("50000 100000\n")
-    assert threads._quota(tmp_path / "root", own) == 0.5
-
-
 def test_the_benchmark_counts_what_threads_share_and_what_kernels_move(monkeypatch):
     """A coarse tank: times for every number of threads, a serial share between none and all, Amdahl's law, and as many
     bytes for a field of known size as it has."""
