@@ -237,6 +237,31 @@ def test_debris_that_something_else_stops_has_not_hit_what_it_grazes(scene):
     assert crate_hits(scene, [[0.01 * J, 0, 0], [0, 0, 0], [-J, 0, 0]])["pairs"] == 0
 
 
+def test_rubble_of_a_wall_can_be_hit_by_another_body(scene):
+    s, J = scene[0], 500.0 * 3.0
+    s.x[0, 0] += 0.3  # out of its place
+    (hit,) = crate_hits(scene, [[J, 0, 0], [0, 0, 0], [-J, 0, 0]])["list"]
+    assert (hit["block"], hit["other"]) == ("crate", "wall-0")
+
+
+def test_rubble_of_a_wall_that_tumbles_over_itself_hits_nothing(scene):
+    s, watch, coupling = scene
+    s.x[:2, 0] += 0.3
+    s.v[1, 2] = -3.0
+    watch.step(coupling, record(0.2))
+    s.v = np.zeros((3, 6))
+    J = s.mass[1] * 3.0
+    watch.step(coupling, record(0.21, contact=[[0, 0, -J], [0, 0, J], [0, 0, 0]]))
+    assert verdict(s, watch)["hits"]["pairs"] == 0
+
+
+def test_a_run_reports_the_judged_body_with_the_largest_force(scene):
+    _, watch, coupling = scene
+    push = np.array([[30.0, 0, 0], [0, 40.0, 0], [900.0, 0, 0]])  # the crate is not judged
+    watch.step(coupling, record(0.1, load=push))
+    assert watch.strongest() == ("wall", pytest.approx(50.0))
+
+
 def test_a_press_without_a_change_of_speed_is_no_hit(scene):
     s, watch, coupling = scene
     s.x[2, 0] = 4.2
