@@ -23,6 +23,8 @@ FILM = 0.1
 UNKNOWN = -9999.0
 NEVER = -1.0
 """Value in place of a time of arrival, since checkpoints hold finite numbers."""
+DIGITS = 7
+"""Significant digits of a value: millimetres of a bed some thousand metres above the zero of its map."""
 KEPT = ("depth", "speed", "flux", "arrival")
 
 
@@ -122,7 +124,7 @@ class Maps:
         head = [f"# {what}; coordinates of {frame}", f"ncols {len(x)}", f"nrows {len(y)}"]
         head += [f"xllcenter {x0:.10g}", f"yllcenter {y0:.10g}", *size, f"NODATA_value {UNKNOWN:g}"]
         rows = np.where(np.isfinite(z), z, UNKNOWN).T[::-1]
-        lines = [" ".join(f"{value:.4g}" for value in row) for row in rows]
+        lines = [" ".join(f"{value:.{DIGITS}g}" for value in row) for row in rows]
         new = path.with_suffix(".new")
         new.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
         new.replace(path)

@@ -1,5 +1,6 @@
 """Maps of a flood over terrain: exact for level water, kept over a restart, readable as terrain."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +97,17 @@ def test_what_was_gathered_goes_into_checkpoints_and_files(flood, tmp_path):
     ]  # fmt: skip
     grid = read_grid(tmp_path / "maps" / "bed.asc")
     np.testing.assert_allclose(grid.x, 500.0 + maps.fitted.column_x)
-    np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-6, atol=1e-9)
+    head = (tmp_path / "maps" / "bed.asc").read_text(encoding="utf-8").split("NODATA_value")[0]
+    assert "cellsize 1\n" in head  # not every program knows dx and dy
+
+
+def test_heights_far_above_the_zero_of_the_map_keep_their_millimetres(flood, tmp_path):
+    """A bed at 1523.4 m was written as 1523, so that level plus depth was off by half a metre."""
+    _, maps = flood
+    maps.fitted = replace(maps.fitted, bed=maps.fitted.bed + 1523.4)
+    maps.write(tmp_path / "maps")
+    np.testing.assert_allclose(read_map(tmp_path / "maps" / "bed.asc").z.T, maps.fitted.bed, atol=1e-3)
 
 
 @pytest.fixture
