@@ -149,14 +149,25 @@ def test_errors_are_against_the_exact_answer_and_else_against_the_reference():
 
 
 def test_exact_answers_come_from_the_promises_of_the_case(tmp_path):
-    assert exact_answers(PULLED)["dissipated"].value == 562.5
-    assert exact_answers(tmp_path) == {}
+    assert exact_answers(load(PULLED))["dissipated"].value == 562.5
+    (tmp_path / "case.toml").write_text((PULLED / "case.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    assert exact_answers(load(tmp_path)) == {}
+
+
+def test_promises_of_a_case_are_no_answers_once_its_values_are_changed():
+    """With twice the strength each law has twice the force and the energy; each was said to be off by 100 %."""
+    plan = make_plan(PULLED, ["joints.strength=2 MPa"], ["bilinear"], [1], 100)
+    assert exact_answers(plan.file) == {}
+    outcomes = [outcome("polynomial", [0.0, 2e6]), outcome("bilinear", [0.0, 1.99e6])]
+    said = table(plan, outcomes, rows(outcomes, {}), {})
+    assert "expected.toml are those of the case without --set" in said
+    assert "error of peak force: against polynomial" in said
 
 
 def test_table_csv_and_json_say_the_same(tmp_path):
     plan = make_plan(PULLED, [], ["cohfrict"], [1], 100)
     outcomes = [outcome("polynomial", [0.0, 1e6, 0.0]), outcome("cohfrict", [0.0, 9e5, 0.0])]
-    exact = exact_answers(PULLED)
+    exact = exact_answers(load(PULLED))
     found = write(plan, outcomes, exact, tmp_path)
     assert found == rows(outcomes, exact)
     head = (tmp_path / "comparison.csv").read_text(encoding="utf-8").splitlines()[0]
@@ -222,7 +233,7 @@ def test_the_figure_is_made_from_the_files_alone(tmp_path):
     pytest.importorskip("matplotlib", reason="the extra `view` is not installed")
     plan = make_plan(PULLED, [], ["cohfrict"], [1], 100)
     outcomes = [outcome("polynomial", [0.0, 1e6, 0.0]), outcome("cohfrict", [0.0, 9e5, 0.0])]
-    write(plan, outcomes, exact_answers(PULLED), tmp_path)
+    write(plan, outcomes, exact_answers(plan.file), tmp_path)
     (tmp_path / "laws").mkdir()
     for o in outcomes:
         lines = [",".join(o.table), *(",".join(map(str, line)) for line in zip(*o.table.values()))]

@@ -27,7 +27,7 @@ def compare(
         plan.file, output or plan.file.directory / "runs" / f"compare-{stamp}"
     ) as directory:
         outcomes = run_plan(plan, directory.path, lambda text: _tell(directory, text))
-        exact = exact_answers(plan.file.directory)
+        exact = exact_answers(plan.file)
         rows = write(plan, outcomes, exact, directory.path)
         print(table(plan, outcomes, rows, exact))
         draw("coupler.commands.view.comparison", directory.path)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from array_types import Array
+from coupler.checks.read_case import CaseFile
 from coupler.commands.compare.plan import OwnLaw
 from yade_scripts.stock.script import StockLaw
 
@@ -67,10 +67,11 @@ class Exact:
     source: str
 
 
-def exact_answers(directory: Path) -> dict[str, Exact]:
-    """Entries of expected.toml with `compare`, by kind; empty without any."""
-    path = directory / "expected.toml"
-    if not path.exists():
+def exact_answers(file: CaseFile) -> dict[str, Exact]:
+    """Entries of expected.toml with `compare`, by kind; empty without any, and for a case with changed values, of which
+    they say nothing."""
+    path = file.directory / "expected.toml"
+    if file.overrides or not path.exists():
         return {}
     entries = tomllib.loads(path.read_text(encoding="utf-8"))["expect"]
     return {e["compare"]: Exact(e["value"], e["source"]) for e in entries if e.get("compare") in KINDS}

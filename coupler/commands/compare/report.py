@@ -140,6 +140,10 @@ def table(plan: Plan, outcomes: list[Outcome], found: list[dict], exact: dict[st
         ).rstrip()
         for line in cells
     ]
+    if plan.file.overrides and (plan.file.directory / "expected.toml").exists():
+        lines.append(
+            "the exact results of expected.toml are those of the case without --set, and are left out"
+        )
     for kind in KINDS:
         against = f"{exact[kind].value:g} ({exact[kind].source})" if kind in exact else f"{plan.laws[0].name}"
         lines.append(f"error of {kind.replace('_', ' ')}: against {against}")
