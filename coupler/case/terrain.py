@@ -62,6 +62,11 @@ class Terrain(Section):
         None, description="the same for its heights; absent: scale (with reproject: metres)"
     )
     positive: Literal["up", "down"] = Field("up", description="down: the file holds depths")
+    no_data: Annotated[float, Field(allow_inf_nan=False)] | None = Field(
+        None,
+        description="number in the file that stands for no height, where the file itself does not say so",
+        examples=[-9999],
+    )
     zero: Length = Field(
         0.0,
         description="height above the datum of the file that becomes z = 0, for instance of the sea that day",

@@ -206,6 +206,40 @@ def test_holes_are_filled_harmonically_and_only_on_demand(tmp_path):
     assert np.isfinite(found(np.array([4.0]), np.array([5.0]))).all(), "the edge of a hole is known"
 
 
+@pytest.mark.parametrize("mark", [-9999.0, -32768.0, 99999.0, 9.96920996838687e36])
+def test_marks_of_missing_heights_that_the_file_does_not_declare_are_no_ground(tmp_path, mark):
+    """As ground 99999 made an island in the river, where the laser found water, and -9999 a pit. What is told to write
+    makes them holes."""
+    x, y = np.meshgrid(X, Y, indexing="ij")
+    plane = 0.2 * x - 0.4 * y
+    holed = plane.copy()
+    holed[5:9, 3:8] = mark
+    np.savetxt(tmp_path / "g.xyz", np.column_stack([x.ravel(), y.ravel(), holed.ravel()]))
+    place = str(tmp_path / "g.xyz")
+    side = "lowest" if mark < 0.0 else "highest"
+    told = rf"its {side} points, 20 at .*; write no_data = {re.escape(f'{mark:.7g}')}, and fill = true"
+    with pytest.raises(TerrainError, match=told):
+        terrain_of(Terrain(path=place))
+    found = terrain_of(Terrain(path=place, no_data=float(f"{mark:.7g}"), fill=True))
+    np.testing.assert_allclose(found.z, plane, atol=1e-9)
+
+
+def test_a_cliff_is_no_mark_of_missing_heights(tmp_path):
+    write_esri(tmp_path / "g.asc", np.where(np.arange(len(X))[:, None] < 7, -3800.0, Z))
+    assert terrain_of(Terrain(path=str(tmp_path / "g.asc"))).z.min() == -3800.0
+
+
+def test_a_mark_in_single_precision_is_that_of_the_head(tmp_path):
+    """GDAL writes it with 17 digits in the head, other programs with six among the heights."""
+    holed = Z.copy()
+    holed[5:9, 3:8] = -9999
+    write_esri(tmp_path / "g.asc", holed)
+    text = (tmp_path / "g.asc").read_text()
+    text = text.replace("NODATA_value -9999", "NODATA_value -3.4028234663852886e+38")
+    (tmp_path / "g.asc").write_text(text.replace("-9999.000000", "-3.40282e+38"))
+    assert np.isnan(terrain_of(Terrain(path=str(tmp_path / "g.asc"))).z).sum() == 20
+
+
 def test_smoothing_keeps_planes_and_wears_waves_down():
     x, y = np.meshgrid(np.arange(200.0), np.arange(20.0), indexing="ij")
     wave = smoothed(0.1 * x + np.cos(2 * np.pi * x / 10), x[:, 0], y[0], 3.0)

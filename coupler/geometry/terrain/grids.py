@@ -18,6 +18,8 @@ from coupler.program.errors import briefly, did_you_mean
 
 EVEN = 1e-3
 """Share of a spacing by which the points of a raster may be off."""
+SINGLE = 2e-6
+"""Share by which a number that was written with six digits differs from itself."""
 MOST_BYTES = 512_000_000
 """Largest size [B] of a terrain file that is read as text."""
 MOST_POINTS = 40_000_000
@@ -46,6 +48,11 @@ def read_grid(path: Path, variable: str | None = None) -> Grid:
     return grid
 
 
+def without(z: Array, mark: float) -> Array:
+    """Heights with NaN in place of a mark of missing ones, which may be written with the digits of single precision."""
+    return np.where(np.isclose(z, mark, rtol=SINGLE, atol=0.0), np.nan, z)
+
+
 # ---------------------------------------------------------------- ESRI ASCII grid
 
 
@@ -67,7 +74,7 @@ def _esri(path: Path, _variable) -> Grid:
             f"{path.name}: {len(values)} heights, but its head says {nx} x {ny} = {nx * ny}; the file is torn"
         )
     z = values.reshape(ny, nx)[::-1].T.copy()
-    z[z == head.get("nodata_value", -9999.0)] = np.nan
+    z = without(z, head.get("nodata_value", -9999.0))
     half = {name: 0.5 * size[name] if f"{name}llcorner" in head else 0.0 for name in "xy"}
     x0 = head.get("xllcorner", head.get("xllcenter", 0.0)) + half["x"]
     y0 = head.get("yllcorner", head.get("yllcenter", 0.0)) + half["y"]

@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,9 +20,11 @@ import numpy as np
 
 from array_types import Array
 from coupler.geometry.terrain.grid import Grid, TerrainError
-from coupler.geometry.terrain.grids import MOST_POINTS, read_grid
+from coupler.geometry.terrain.grids import MOST_POINTS, read_grid, without
 from coupler.geometry.terrain.height_map import HeightMap
 
+LONELY = 5000.0
+"""Height [m] between the lowest or highest points of a file and all others from which they are no ground."""
 KEPT = ".terrain"
 """Folder beside the file."""
 FORMAT = 2
@@ -103,7 +106,12 @@ def _checksum(spec) -> str:
 
 def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
     crs = spec.crs or grid.crs
+    if spec.no_data is not None:
+        grid = replace(grid, z=without(grid.z, spec.no_data))
     if spec.reproject is not None:
+        _refuse_marks(
+            name, grid.z, spec.height_scale or 1.0
+        )  # before they are blended with what lies beside them
         from coupler.geometry.terrain.raster import reprojected
 
         grid = reprojected(name, grid, crs, spec.reproject)
@@ -120,6 +128,7 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
         raise TerrainError(
             f"{name}: {z.size:.3g} points; crop it (terrain.crop) to fewer than {MOST_POINTS:.3g}"
         )
+    _refuse_marks(name, z, height_unit)
     x, y = x * unit, y * unit
     z = (z if spec.positive == "up" else -z) * height_unit - spec.zero
     if spec.fill:
@@ -129,6 +138,21 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
     if spec.steepest is not None:
         z = flattened(z, x, y, float(np.tan(spec.steepest)))
     return x, y, z
+
+
+def _refuse_marks(name: str, z, unit: float) -> None:
+    """Refuse numbers that stand for missing heights and are not declared as such: as ground -9999 is a pit, and 99999
+    an island where there is water."""
+    known = z[np.isfinite(z)]
+    for worst, side in ((known.min(initial=np.inf), "lowest"), (known.max(initial=-np.inf), "highest")):
+        others = known[known != worst]
+        if len(others) and np.abs(others - worst).min() * unit > LONELY:
+            mark = f"{worst:.7g}"
+            raise TerrainError(
+                f"{name}: its {side} points, {len(known) - len(others)} at {mark}, lie "
+                f"{np.abs(others - worst).min() * unit:.3g} m from all others: a mark of missing heights, most likely, "
+                f"that the file does not declare; write no_data = {mark}, and fill = true where they lie under the tank"
+            )
 
 
 def _refuse_degrees(name: str, grid: Grid, crs: str, spec) -> None:
