@@ -287,6 +287,33 @@ def test_feet_and_degrees_are_refused_until_they_are_said(tmp_path):
         terrain_of(Terrain(path=str(tmp_path / "g.asc"), smooth=1.0))
 
 
+@pytest.mark.parametrize(
+    "system",
+    [
+        'PROJCS["WGS 84 / Pseudo-Mercator",GEOGCS["WGS 84",DATUM["WGS_1984"]],UNIT["metre",1]]',
+        'PROJCS["WGS_1984_Web_Mercator_Auxiliary_Sphere",GEOGCS["GCS_WGS_1984"],UNIT["Meter",1.0]]',
+        "EPSG:3857",
+    ],
+)
+def test_coordinates_of_web_maps_are_refused_until_they_are_said(tmp_path, system):
+    """At 38.4 degrees north their metre is 1/cos = 1.28 m long: slopes were a quarter too flat, distances too long."""
+    x, y = 15_553_570.0, 4_635_000.0
+    rows = "\n".join(["0 1 2 3"] * 4)
+    path = tmp_path / "web.asc"
+    path.write_text(f"ncols 4\nnrows 4\nxllcenter {x}\nyllcenter {y}\ncellsize 5\n{rows}\n")
+    path.with_suffix(".prj").write_text(system if "[" in system else "")
+    crs = None if "[" in system else system
+    with pytest.raises(
+        TerrainError, match=r"1\.28 times too long .* reproject = 'EPSG:32654', or scale = 0\.78"
+    ):
+        terrain_of(Terrain(path=str(path), crs=crs))
+    with pytest.raises(TerrainError, match="system of web maps"):
+        terrain_of(Terrain(path=str(path), crs=crs, reproject="EPSG:3857"))
+    found = terrain_of(Terrain(path=str(path), crs=crs, scale=0.784, height_scale=1.0))
+    assert found.spacing == pytest.approx((3.92, 3.92))
+    assert found.z.max() == 3.0
+
+
 def test_a_site_is_not_scaled_again_after_it_was_reprojected(tmp_path, monkeypatch):
     """A change of the coordinate system makes metres; heights in feet have a key of their own."""
 

@@ -30,6 +30,10 @@ KEPT = ".terrain"
 FORMAT = 2
 """Version of the steps below; after a change, rasters kept before are made again."""
 FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
+MERCATOR = re.compile(r"(?:pseudo|web)[ _-]mercator|EPSG\W+(?:3857|3785|900913)\b", re.IGNORECASE)
+"""Coordinate systems of web maps, by name or code."""
+EARTH = 6378137.0
+"""Radius [m] of the sphere of these systems."""
 PLACED = ("origin", "turn", "offset", "land")
 """Options of the position or the land use alone, which do not change the kept raster."""
 
@@ -109,14 +113,19 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
     if spec.no_data is not None:
         grid = replace(grid, z=without(grid.z, spec.no_data))
     if spec.reproject is not None:
-        _refuse_marks(
-            name, grid.z, spec.height_scale or 1.0
-        )  # before they are blended with what lies beside them
+        if MERCATOR.search(spec.reproject):
+            raise TerrainError(
+                f"{name}: terrain.reproject = '{spec.reproject}' is a system of web maps, whose metres are longer than "
+                "metres away from the equator; take another, UTM for instance"
+            )
+        # before they are blended with what lies beside them
+        _refuse_marks(name, grid.z, spec.height_scale or 1.0)
         from coupler.geometry.terrain.raster import reprojected
 
         grid = reprojected(name, grid, crs, spec.reproject)
     else:
         _refuse_degrees(name, grid, crs, spec)
+        _refuse_mercator(name, grid, crs, spec)
     unit, height_unit = spec.scale, spec.height_scale or spec.scale  # after reproject scale is 1
     if FEET.search(crs) and spec.scale == 1.0 and spec.reproject is None:
         raise TerrainError(
@@ -165,6 +174,20 @@ def _refuse_degrees(name: str, grid: Grid, crs: str, spec) -> None:
             f"{name}: its coordinates are degrees ({crs[:40]}); write reproject, the code of a metric system, for "
             f"instance {_utm(0.5 * (grid.x[0] + grid.x[-1]), 0.5 * (grid.y[0] + grid.y[-1]))!r} there"
         )
+
+
+def _refuse_mercator(name: str, grid: Grid, crs: str, spec) -> None:
+    """Refuse coordinates of web maps, whose metres are 1/cos(latitude) metres long."""
+    if not MERCATOR.search(crs) or spec.scale != 1.0:
+        return
+    x, y = 0.5 * (grid.x[0] + grid.x[-1]), 0.5 * (grid.y[0] + grid.y[-1])
+    latitude = float(np.arctan(np.sinh(y / EARTH)))
+    longer, true = 1.0 / np.cos(latitude), _utm(float(np.degrees(x / EARTH)), float(np.degrees(latitude)))
+    raise TerrainError(
+        f"{name}: its coordinates are those of web maps (Mercator), which make the site {longer:.3g} times too long "
+        f"and wide at its latitude of {np.degrees(latitude):.3g} degrees; write reproject = '{true}', or scale = "
+        f"{1.0 / longer:.5g} with height_scale = 1"
+    )
 
 
 def _utm(longitude: float, latitude: float) -> str:
