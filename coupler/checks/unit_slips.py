@@ -11,10 +11,13 @@ from coupler.case.case import Case
 from coupler.case.keys import keys
 from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath
+from coupler.checks.softness import STANDING
 from coupler.geometry.parts import parts_of
 
 LIGHTEST, HEAVIEST = 5.0, 25e3
 """Densities [kg/m3] between which solids and liquids lie: foam and platinum."""
+WEIGHTS = 15.0, 30.0
+"""Unit weights [kN/m3] of masonry and concrete, reinforced or not."""
 WEAKEST = 1.0
 """Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
 ROUGHEST = 3.0
@@ -30,6 +33,7 @@ def unit_remarks(case: Case) -> Iterator[str]:
         if not LIGHTEST <= block.density <= HEAVIEST:
             yield f"the density of '{block.name}' is {block.density:g} kg/m3; other units are text, \"2.4 g/cm3\""
             break
+    yield from _weight_remarks(case)
     if case.water is not None and not LIGHTEST <= case.water.density <= HEAVIEST:
         yield f'water.density is {case.water.density:g} kg/m3; other units are text, "1 t/m3"'
     j = case.joints
@@ -46,6 +50,21 @@ def unit_remarks(case: Case) -> Iterator[str]:
             )
     yield from _friction_remarks(case)
     yield from _angle_remarks(case)
+
+
+def _weight_remarks(case: Case) -> Iterator[str]:
+    """Densities of what stands, or is joined, that are as light as foam and as large as unit weights; once for the
+    first."""
+    for part in parts_of(case):
+        if case.joints is None and part.path[1] not in STANDING:
+            continue
+        for block in part.blocks:
+            if WEIGHTS[0] <= block.density <= WEIGHTS[1]:
+                yield (
+                    f"the density of '{block.name}' is {block.density:g} kg/m3, that of foam; a unit weight of "
+                    f"{block.density:g} kN/m3 is a density of {1000.0 * block.density / 9.81:.0f} kg/m3"
+                )
+                return
 
 
 def _friction_remarks(case: Case) -> Iterator[str]:

@@ -54,13 +54,13 @@ def check_balance(
     """
     if not math.isfinite(volume_error) or abs(volume_error) > limits.volume_error:
         raise Diverged(
-            f"the water volume is off by {volume_error:+.2%} at t = {time:.4g} s; limit "
-            f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
+            f"the water volume is off by {100 * volume_error:+.3g} % at t = {time:.4g} s; limit "
+            f"{100 * limits.volume_error:.3g} % (limits.volume_error). Reduce time.cfl or tank.cell."
         )
     if not math.isfinite(energy_error) or energy_error > limits.energy_error:
         sentences = (
-            f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
-            f"{limits.energy_error:.2%} (limits.energy_error).",
+            f"the energy balance is off by {100 * energy_error:.3g} % of the input energy at t = {time:.4g} s; limit "
+            f"{100 * limits.energy_error:.3g} % (limits.energy_error).",
             advice(),
             "See history/energy.csv for the line that grows.",
         )

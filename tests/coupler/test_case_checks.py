@@ -629,6 +629,18 @@ def test_values_that_look_like_a_wrong_unit_are_reported(sections, says):
     assert reported(case(**sections)) == []
 
 
+def test_a_unit_weight_that_is_given_as_a_density_is_remarked_on():
+    """24 kN/m3 of concrete as 24 kg/m3: the house swims away. A loose float of foam is meant."""
+    wall = {"lower": [7, 4, 0], "size": [1, 2, 2], "block": [1, 1, 1], "density": 24}
+    sections = {"structure": {"wall": [wall]}, "contact": {"stiffness": 1e9}}
+    found = [text for text in remarks(case(**sections)) if "unit weight" in text]
+    assert found == [
+        "the density of 'wall-0-0-0' is 24 kg/m3, that of foam; a unit weight of 24 kN/m3 is a density of 2446 kg/m3"
+    ]
+    buoy = structure({"centre": [7, 5, 2], "density": 24}) | {"contact": {"stiffness": 1e9}}
+    assert not [text for text in remarks(case(**buoy)) if "unit weight" in text]
+
+
 def test_plausible_angles_friction_and_densities_are_not_remarked_on():
     """A full turn, rubber on concrete, sea water."""
     block = {"centre": [7, 5, 2], "rotation": {"axis": [0, 0, 1], "angle": "360 deg"}}

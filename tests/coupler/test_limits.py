@@ -8,7 +8,7 @@ import pytest
 
 from coupler.balance.energy import Balance
 from coupler.geometry.overlaps import Overlap
-from coupler.step.limits import Diverged, Limits, check_air, check_momentum, check_overlap
+from coupler.step.limits import Diverged, Limits, check_air, check_balance, check_momentum, check_overlap
 from coupler.step.step_limits import (
     STEP_SHARE,
     Attempt,
@@ -25,6 +25,15 @@ def test_a_run_ends_just_beyond_its_limit_of_momentum():
         check_momentum(1.0, 1.1e-6, 1e-6)
     with pytest.raises(Diverged):
         check_momentum(1.0, np.nan, 1e-6)
+
+
+def test_small_limits_of_a_balance_are_told_with_their_digits():
+    """Not: off by 0.00% of the input energy, limit 0.00%."""
+    limits = Limits(2e-6, 1e-9, None)
+    with pytest.raises(Diverged, match=r"off by 1\.5e-07 % of the input energy at t = 1 s; limit 1e-07 % "):
+        check_balance(1.0, 0.0, 1.5e-9, limits)
+    with pytest.raises(Diverged, match=r"volume is off by -0\.0003 % at t = 1 s; limit 0\.0002 % "):
+        check_balance(1.0, -3e-6, 0.0, limits)
 
 
 def test_contact_is_to_be_stiffer_by_the_square_of_what_the_overlap_exceeds():
