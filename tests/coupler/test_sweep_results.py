@@ -74,7 +74,7 @@ class Fake:
     """An `Execute`: a run has the value `load` at its end; some fail. calls: what was executed."""
 
     def __init__(self):
-        self.calls, self.ends = [], {}
+        self.calls, self.ends, self.doubts = [], {}, {}
 
     def __call__(self, words, log):
         from coupler.checks.read_case import load
@@ -110,7 +110,12 @@ class Fake:
             summary = {"status": status, "exit_code": int(code), "exit_reason": reason}
             if "carry" in reason:
                 summary["error"] = "CannotStand"
-        figures = {"time": 1.0, "joints": 2, "cpu_seconds": {}}
+        figures = {
+            "time": 1.0,
+            "joints": 2,
+            "cpu_seconds": {},
+            "doubts": self.doubts.get(len(self.calls), []),
+        }
         from coupler.case.case import effective
 
         (place / "run.json").write_text(
@@ -121,11 +126,11 @@ class Fake:
 
 @pytest.fixture
 def made(tmp_path):
-    def make_it(sweep=SWEEP, keep="histories", ends=None):
+    def make_it(sweep=SWEEP, keep="histories", ends=None, doubts=None):
         (tmp_path / "case.toml").write_text(CASE + sweep.format(keep=keep), encoding="utf-8")
         spec = write_spec(tmp_path / "out", make_plan(tmp_path), 1)
         fake = Fake()
-        fake.ends = ends or {}
+        fake.ends, fake.doubts = ends or {}, doubts or {}
         for id in spec.runs:
             make(spec, id, fake)
         return spec, fake
@@ -323,6 +328,23 @@ def test_a_quantity_that_runs_do_not_have_is_reported_with_the_reason(made, caps
     (place / "run.json").write_text(json.dumps(summary))
     why = read_quantity(place, spec.sweep.quantity[0]).why
     assert why == "peak: figure 'cost' of run.json is no number; there are cost.water"
+
+
+def test_reasons_to_doubt_runs_are_told_at_the_end_and_on_the_page(made, capsys):
+    """Walls that no water reached stand in every curve. Those that differ in names and numbers alone are told once, and
+    what a run that diverged doubts is not."""
+    dry = "no water touched '{}' until the run ended at t = {:g} s"
+    doubts = {2: [dry.format("a", 1.0)], 4: [dry.format("b", 1.5e-3), "thin"], 5: ["thin"]}
+    spec, _ = made(doubts=doubts, ends={5: ("diverged", ExitCode.DIVERGED, "off")})
+    finish(spec, stopped=False)
+    said = capsys.readouterr().out
+    page = unescape((spec.folder / "report.html").read_text(encoding="utf-8"))
+    for text in (
+        "2 of 47 rows that are done, the first of them row 1: no water touched 'a' until the run ended at t = 1 s",
+        "1 of 47 rows that are done, the first of them row 3: thin",
+    ):
+        assert said.count(f"but: {text}") == page.count(text) == 1
+    assert "'b'" not in said
 
 
 def test_runs_that_all_change_at_one_intensity_are_refused_in_words_that_fit_it():

@@ -256,6 +256,8 @@ def finish(spec: Spec, stopped: bool) -> ExitCode:
             print(f"note: no figures: {reason}")
     for sentence in results.lacking:
         print(f"note: {sentence}")
+    for sentence in results.doubted:
+        print(f"but: {sentence}")
     print(f"report: {page.write(spec, results)}")
     print(_summary(results))
     left = any(record["outcome"] not in FINAL for record in results.records)

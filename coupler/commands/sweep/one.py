@@ -194,6 +194,7 @@ def _record(spec: Spec, id: str, cost: Cost, before: dict) -> dict:
         "attempts": before.get("attempts", 0) + 1,
         "cpu_limit": spec.sweep.cpu_seconds,
         "time": summary.get("figures", {}).get("time"),
+        "doubts": summary.get("figures", {}).get("doubts", []),
         "host": platform.node(),
         "job": os.environ.get("SLURM_JOB_ID", ""),
         "program": program(),

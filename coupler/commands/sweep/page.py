@@ -56,6 +56,7 @@ def _page(spec: Spec, results: Results) -> str:
             f"<h1>Sweep: {escape(spec.title)}</h1>",
             paragraph(spec.sweep.note),
             _verdict(results),
+            *(f'<p class="verdict bad">{escape(sentence)}</p>' for sentence in results.doubted),
             section("What was run", _what(spec, results), *(note(r) for r in spec.remarks)),
             *_fragilities(spec),
             section("On what the results depend", *_sensitivities(spec)),

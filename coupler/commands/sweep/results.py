@@ -7,6 +7,7 @@ with the units as attributes, where the extra `parquet` is installed. `table` gi
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ from coupler.results.history import Column, header, line
 from coupler.results.history import number as shortest
 from coupler.run.summary import read_summary
 
+NUMBERS = re.compile(r"'[^']*'|\d[\d.e+-]*")
+"""What differs between runs in one reason to doubt: names and numbers."""
 FREE = " (free field)"
 """Suffix of the meaning of a quantity that is taken from the run without structure."""
 NOT_YET = "not yet"
@@ -32,12 +35,14 @@ NOT_YET = "not yet"
 @dataclass(frozen=True)
 class Results:
     """columns as declared; records: a dict of them for each row; figures: how each run ended, by its id; lacking: a
-    sentence for each quantity that runs which are done have no number of."""
+    sentence for each quantity that runs which are done have no number of; doubted: one for each reason to doubt the
+    loads or the verdict of runs that are done."""
 
     columns: tuple[Column, ...]
     records: tuple[dict, ...]
     figures: dict[str, dict]
     lacking: tuple[str, ...] = ()
+    doubted: tuple[str, ...] = ()
 
     def column(self, name: str) -> list:
         """The values of a column, row by row."""
@@ -54,7 +59,19 @@ def collect(spec: Spec) -> Results:
         f"{name} has no number in {len(why)} of {done} rows that are done: {why[0]}"
         for name, why in lacks.items()
     )
-    return Results(tuple(_columns(spec)), records, found, lacking)
+    return Results(tuple(_columns(spec)), records, found, lacking, tuple(_doubted(records, found)))
+
+
+def _doubted(records: tuple[dict, ...], found: dict[str, dict]) -> Iterator[str]:
+    """Reasons to doubt that differ in their numbers alone are one, told by the first row that has it."""
+    done = [record for record in records if record["outcome"] == "done"]
+    rows: dict[str, list[tuple[int, str]]] = {}
+    for record in done:
+        for doubt in found[record["id"]].get("doubts", []):
+            rows.setdefault(NUMBERS.sub("#", doubt), []).append((record["run"], doubt))
+    for cases in rows.values():
+        number, doubt = cases[0]
+        yield f"{len(cases)} of {len(done)} rows that are done, the first of them row {number}: {doubt}"
 
 
 def _ids(spec: Spec) -> list[str]:
