@@ -9,7 +9,7 @@ from scipy.io import netcdf_file
 
 from coupler.checks.read_case import load
 from coupler.commands.export.netcdf import write_netcdf
-from coupler.commands.view.flood_map import in_tank
+from coupler.commands.view.flood_map import draw, in_tank
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
 from coupler.results.even_raster import even_raster
@@ -214,3 +214,21 @@ def test_row_of_a_building_has_the_flood_around_it_and_its_walls_in_the_order_of
     members = [{"name": n, "joints": 7, "joints_broken": k, "first_break": {"time": t}} for n, k, t in broken]
     assert _walls("h", members, ("h-wall0x-", "h-roof0", "h-wall0y+")) == "roof0 1/7 wall0x- 2/7"
     assert _walls("pier", [members[0] | {"name": "pier"}], ("pier",)) == ""
+
+
+def test_a_map_without_a_value_says_so_and_has_no_scale(tmp_path, monkeypatch):
+    """Where no dry ground was reached, the arrival had a scale from 0 to 1 s."""
+    import matplotlib.figure
+
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "effective.json").write_text('{"tank": {"lower": [0, 0, 0]}}', encoding="utf-8")
+    for name in ("bed", "depth", "speed", "flux", "arrival"):
+        rows = "\n".join(["-9999 -9999 -9999" if name == "arrival" else "1 2 3"] * 3)
+        head = "ncols 3\nnrows 3\nxllcenter 0\nyllcenter 0\ncellsize 1\nNODATA_value -9999\n"
+        (tmp_path / "maps" / f"{name}.asc").write_text(f"{head}{rows}\n", encoding="utf-8")
+    drawn = []
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda self, *_, **__: drawn.append(self))
+    draw(tmp_path, tmp_path / "map.png", "a site")
+    said = [text.get_text() for axis in drawn[0].axes for text in axis.texts]
+    assert said == ["no dry ground was reached"]
+    assert len(drawn[0].axes) == 4 + 3  # three have a scale

@@ -20,6 +20,10 @@ MAPS = (
     ("flux", "largest $h v^2$ [m$^3$/s$^2$]", "magma_r"),
     ("arrival", "arrival [s]", "cividis"),
 )
+SHOWN = 99.5
+"""Percentile of a map at which its colours end; a tip on the bar says that few points are beyond."""
+NOWHERE = "no water", "no dry ground was reached"
+"""What a map without a value says, and that of the arrival."""
 STATES = {"stands": "#2a9d5c", "damaged": "#f2a73b", "collapsed": "#c8322b"}
 
 
@@ -38,10 +42,14 @@ def draw(run: Path, picture: Path, title: str) -> None:
     for axis, (name, label, colours) in zip(axes.flat, MAPS):
         z = read_map(run / "maps" / f"{name}.asc").z
         axis.contourf(x, y, bed, levels=12, cmap="Greys", alpha=0.35)
-        highest = np.nanpercentile(z, 99.5) if np.isfinite(z).any() else 1.0
-        image = axis.pcolormesh(
-            x, y, z, cmap=colours, vmin=0.0 if name != "arrival" else None, vmax=highest, shading="nearest"
-        )
+        if np.isfinite(z).any():
+            image = axis.pcolormesh(
+                x, y, z, cmap=colours, vmin=0.0 if name != "arrival" else None,
+                vmax=np.nanpercentile(z, SHOWN), shading="nearest",
+            )  # fmt: skip
+            figure.colorbar(image, ax=axis, shrink=0.85, extend="max")
+        else:
+            axis.text(0.5, 0.5, NOWHERE[name == "arrival"], transform=axis.transAxes, ha="center")
         axis.contour(x, y, bed, levels=[0.0], colors="k", linewidths=0.8)
         for state, colour in STATES.items():
             of_state = [h for h in houses if h["state"] == state]
@@ -63,7 +71,6 @@ def draw(run: Path, picture: Path, title: str) -> None:
             xlim=(x[0], x[-1]),
             ylim=(y[0], y[-1]),
         )
-        figure.colorbar(image, ax=axis, shrink=0.85)
     if houses:
         axes[0, 0].legend(loc="upper left", fontsize=8)
     figure.suptitle(title)
