@@ -6,7 +6,7 @@ import pytest
 from coupler.case.inflow_records import record_of
 from coupler.case.water import RecordInflow
 from coupler.checks.read_case import load
-from coupler.commands.offshore.command import offshore
+from coupler.commands.offshore.command import _case_at_the_coast, offshore
 from coupler.commands.offshore.file import read
 from coupler.program.errors import BadCase
 from coupler.program.extras import absent
@@ -147,6 +147,17 @@ def test_offshore_files_with_mistakes_are_refused(tmp_path, old, new, says):
     assert old in SEA
     with pytest.raises(BadCase, match=says):
         read(made(tmp_path, SEA.replace(old, new)))
+
+
+def test_before_the_first_call_the_case_names_a_record_that_is_not_there(tmp_path):
+    """As the page of the terrain shows it; the command was refused for want of the file that it writes. Other files
+    that a case lacks are told as ever."""
+    path = made(tmp_path)
+    (tmp_path / "wave.csv").unlink()
+    assert _case_at_the_coast(read(path)).tank.lower == (300, 0, -5)
+    (tmp_path / "case.toml").write_text(NEAR.replace('"wave.csv"', '"other.csv"'))
+    with pytest.raises(BadCase, match=r"other\.csv: no such file"):
+        _case_at_the_coast(read(path))
 
 
 @needs_anuga

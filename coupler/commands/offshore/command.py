@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import tempfile
+import tomllib
 from pathlib import Path
 
 import numpy as np
 
 from array_types import Array
+from coupler.case.case import Case
 from coupler.case.inflow_records import ALONG, COLUMNS, DRY, SIDEWAYS, record_of
 from coupler.checks.read_case import load
 from coupler.commands.offshore.file import Offshore, read
@@ -19,6 +21,9 @@ from coupler.program.errors import BadCase
 from coupler.program.extras import NotInstalled, missing
 from coupler.program.process import run_module, trouble
 from coupler.program.terminal import Row
+
+FOR_EVER = 1e9
+"""Time [s] beyond the end of any run."""
 
 
 class OffshoreFailed(BadCase):
@@ -32,7 +37,7 @@ def offshore(path: Path) -> Path:
     if absent:
         raise NotInstalled(absent)
     found = read(path)
-    case = load(found.near.case).case
+    case = _case_at_the_coast(found)
     places = _places(found, case, str(path))
     given = _arrays(found, case, str(path)) | {"places": places - np.array(found.sea.lower)}
     with tempfile.TemporaryDirectory() as folder:
@@ -44,6 +49,36 @@ def offshore(path: Path) -> Path:
         with np.load(out) as file:
             computed = {name: file[name] for name in file.files}
     return _written(found, case, computed, path)
+
+
+def _case_at_the_coast(found: Offshore) -> Case:
+    """The case that the record is for. Before the first call it names a file that is not there yet: still water takes
+    its place, which is as good for the place of the side."""
+    place, record = Path(found.near.case), Path(found.near.record).resolve()
+    if record.exists():
+        return load(place).case
+    file = place / "case.toml" if place.is_dir() else place
+    with tempfile.TemporaryDirectory() as folder:
+        still = Path(folder) / "still.csv"
+        rows = "".join(f"{time:g},{found.sea.level!r},0\n" for time in (-FOR_EVER, FOR_EVER))
+        still.write_text(f"{','.join(COLUMNS)}\n{rows}", encoding="utf-8")
+        sets = [f"water.inflow[{i}].path={still}" for i in _inflows_with(file, record)]
+        return load(place, sets).case
+
+
+def _inflows_with(file: Path, record: Path) -> list[int]:
+    """Numbers of the inflows of a case file that name a record; none where the file is no case."""
+    try:
+        water = tomllib.loads(file.read_text(encoding="utf-8")).get("water", {})
+    except (OSError, ValueError):
+        return []
+    inflows = water.get("inflow", []) if isinstance(water, dict) else []
+    paths = [spec.get("path") if isinstance(spec, dict) else None for spec in inflows]
+    return [
+        i
+        for i, path in enumerate(paths)
+        if isinstance(path, str) and (file.parent / path).resolve() == record
+    ]
 
 
 def _places(found: Offshore, case, name: str) -> Array:
