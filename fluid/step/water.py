@@ -276,9 +276,18 @@ class Water:
     def kick_factor(self, crossing: float | None = None) -> Array:
         """Share (N,) of the acceleration that is carried over to the next step, no more than kick_limit g, or what
         turns the fastest stream aside within two cells, v²/(2 h). More would throw spray on by the acceleration of an
-        impact. crossing: as in `calm`."""
-        fastest = self.fastest() if crossing is None or not self.topology.is_uniform else crossing
-        return self._kick_factor(self.acceleration, self.topology.node_size, fastest)
+        impact. crossing: as in `calm`.
+
+        The pressure that acts again has the same share at each node, and pushes bodies as it pushes the water only
+        where neighbours have the same. Where bodies were cut again, nodes inside them therefore have that of the water
+        beside them: their own acceleration, of what little water their cells hold, is many times that of the water,
+        with another sign in every step, and so was the force on a body that slides through deep water."""
+        t = self.topology
+        fastest = self.fastest() if crossing is None or not t.is_uniform else crossing
+        factor = self._kick_factor(self.acceleration, t.node_size, fastest)
+        if self._domain_is_new:
+            fill_missing(t, t.active & ~t.covered, factor[:, None])
+        return factor
 
     def _kick_factor(self, acceleration, size, fastest):
         p = self.parameters
