@@ -27,7 +27,9 @@ class Verdict(Section):
         description="damaged from more than this share of the joined area broken, or a block out of its place",
     )
     collapsed_weight: Annotated[float, InSI("", gt=0, le=1)] = Field(
-        0.2, description="collapsed when this share of the weight has left its place"
+        0.2,
+        description="collapsed when this share of the weight has left its place and stays out of it: blocks that came "
+        "back, and those that rock so that their weight turns them back, do not count",
     )
     collapsed_joints: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None, description="collapsed also when this share of the joined area is broken; absent: not by joints"

@@ -85,10 +85,12 @@ class _Group(_Part):
     rule: Text
     blocks: Whole
     blocks_moved: Whole
+    blocks_out: Whole | None = None
     joints: Whole
     joints_broken: Whole
     area_broken: Number
     weight_moved: Number
+    weight_out: Number | None = None
     farthest: _Way
     first_break: _First | None
 
@@ -106,6 +108,8 @@ class _Gone(_Part):
 
 class _Displaced(_Part):
     blocks: Whole
+    back: Whole | None = None
+    rocking: Whole | None = None
     first: Number | None
     list: list[_Gone]
 

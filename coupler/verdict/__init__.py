@@ -3,6 +3,7 @@
 damage         shares of joints and weight of a group, and the state they make
 divisions      bodies, walls and storeys of a structure
 depths         the depth of the water beside a structure
+rocking        blocks out of their place that their weight turns back
 watch          what is followed from step to step
 judge          the verdict
 words          the verdict in sentences

@@ -6,11 +6,11 @@ building, storeys, buildings of a town. It needs neither a run nor YADE, so the 
 State       rule (keys of [verdict])
 stands      no more than `damaged_joints` of the joined area is broken, and no block has left its place
 damaged     anything else that is not collapsed
-collapsed   at least `collapsed_weight` of the weight has left its place, or at least `collapsed_joints` of the joined
-            area is broken, where the case gives that key
+collapsed   at least `collapsed_weight` of the weight has left its place and stays out of it, or at least
+            `collapsed_joints` of the joined area is broken, where the case gives that key
 
 A block has left its place when its centre has moved by `moved` of its thickness (the smallest width across a face
-through its centre of mass, as for limits.overlap).
+through its centre of mass, as for limits.overlap). One that came back or rocks (`rocking.py`) does not stay out of it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from array_types import Array, Floats, Ints
+from array_types import Array, Bools, Floats, Ints
 
 NOWHERE = -1
 """Label of a block that belongs to no group, and of the ground."""
@@ -53,15 +53,20 @@ class Rules:
 @dataclass(frozen=True)
 class Blocks:
     """mass (n,) [kg] · thickness (n,) [m] · moved (n,) [m]: how far each centre has moved since the start, the farthest
-    so far"""
+    so far · out (n,) bool: those out of their place that do not come back; None: all that left it"""
 
     mass: Floats
     thickness: Floats
     moved: Floats
+    out: Bools | None = None
 
     def left(self, rules: Rules) -> Array:
         """(n,) bool: blocks that have left their place."""
         return self.moved > rules.moved * self.thickness
+
+    def stay_out(self, rules: Rules) -> Array:
+        """(n,) bool: blocks that have left their place for good."""
+        return self.left(rules) if self.out is None else self.left(rules) & self.out
 
 
 @dataclass(frozen=True)
@@ -84,19 +89,22 @@ class Joints:
 class Damage:
     """What happened to one group.
 
-    blocks, blocks_moved: number of all, and of those that left their place · joints, joints_broken · area_broken: share
-    of the joined area · weight_moved: share of the weight that left its place · farthest [m] and farthest_block: the
-    way of the block that moved most, and its row · first_break [s] and first_joint: time and row of the first joint
-    that broke, None and -1 without one · state · rule: the sentence that decided it
+    blocks, blocks_moved, blocks_out: number of all, of those that left their place, and of those that stay out of it ·
+    joints, joints_broken · area_broken: share of the joined area · weight_moved, weight_out: share of the weight that
+    left its place, and that stays out of it · farthest [m] and farthest_block: the way of the block that moved most,
+    and its row · first_break [s] and first_joint: time and row of the first joint that broke, None and -1 without one ·
+    state · rule: the sentence that decided it
     """
 
     name: str
     blocks: int
     blocks_moved: int
+    blocks_out: int
     joints: int
     joints_broken: int
     area_broken: float
     weight_moved: float
+    weight_out: float
     farthest: float
     farthest_block: int
     first_break: float | None
@@ -112,9 +120,11 @@ class Damage:
     @property
     def word(self) -> str:
         """The state in words; a group that never had joints cannot break, and is called moved, in part or as a
-        whole."""
+        whole, or back in place."""
         if self.joined:
             return self.state.word
+        if self.blocks_moved and not self.blocks_out:
+            return "back in place"
         return ("in place", "partly moved", "moved")[self.state]
 
 
@@ -125,7 +135,7 @@ def damage(label: Array, names: Sequence[str], blocks: Blocks, joints: Joints, r
     blocks: a crack between a wall and a floor is damage to either. Groups without blocks are whole.
     """
     label = np.asarray(label)
-    left = blocks.left(rules)
+    left, out = blocks.left(rules), blocks.stay_out(rules)
     of_a, of_b = _labels_of(label, joints.a), _labels_of(label, joints.b)
     return [
         _of_group(
@@ -134,7 +144,7 @@ def damage(label: Array, names: Sequence[str], blocks: Blocks, joints: Joints, r
             np.flatnonzero((of_a == k) | (of_b == k)),
             blocks,
             joints,
-            left,
+            (left, out),
             rules,
         )
         for k, name in enumerate(names)
@@ -149,24 +159,33 @@ def _labels_of(label: Array, rows: Array) -> Array:
 
 
 def _of_group(
-    name: str, rows: Array, own: Array, blocks: Blocks, joints: Joints, left: Array, rules: Rules
+    name: str,
+    rows: Array,
+    own: Array,
+    blocks: Blocks,
+    joints: Joints,
+    moved: tuple[Array, Array],
+    rules: Rules,
 ) -> Damage:
-    """rows: of its blocks · own: rows of its joints."""
+    """rows: of its blocks · own: rows of its joints · moved: blocks (n,) bool that left their place, and that stay out
+    of it."""
+    left, out = (rows[of_all[rows]] for of_all in moved)
     broken = own[np.isfinite(joints.broken[own])]
     first = broken[np.argmin(joints.broken[broken])] if len(broken) else -1
     farthest = rows[np.argmax(blocks.moved[rows])] if len(rows) else -1
     area = _share(joints.area[broken].sum(), joints.area[own].sum())
-    weight = _share(blocks.mass[rows[left[rows]]].sum(), blocks.mass[rows].sum())
-    moved = int(left[rows].sum())
-    state, rule = state_of(area, weight, moved, rules)
+    weight, weight_out = (_share(blocks.mass[of].sum(), blocks.mass[rows].sum()) for of in (left, out))
+    state, rule = state_of(area, weight_out, (len(left), len(out)), rules)
     return Damage(
         name=name,
         blocks=len(rows),
-        blocks_moved=moved,
+        blocks_moved=len(left),
+        blocks_out=len(out),
         joints=len(own),
         joints_broken=len(broken),
         area_broken=area,
         weight_moved=weight,
+        weight_out=weight_out,
         farthest=float(blocks.moved[farthest]) if farthest >= 0 else 0.0,
         farthest_block=int(farthest),
         first_break=float(joints.broken[first]) if first >= 0 else None,
@@ -176,11 +195,15 @@ def _of_group(
     )
 
 
-def state_of(area_broken: float, weight_moved: float, blocks_moved: int, rules: Rules) -> tuple[State, str]:
-    """The state and the rule that decided it, from shares of the joined area and of the weight."""
-    if weight_moved >= rules.collapsed_weight and blocks_moved:
+def state_of(
+    area_broken: float, weight_out: float, blocks_moved: tuple[int, int], rules: Rules
+) -> tuple[State, str]:
+    """The state and the rule that decided it, from shares of the joined area and of the weight, and from the numbers of
+    blocks that left their place and that stay out of it."""
+    moved, out = blocks_moved
+    if weight_out >= rules.collapsed_weight and out:
         return State.COLLAPSED, (
-            f"{weight_moved:.0%} of its weight left its place "
+            f"{weight_out:.0%} of its weight left its place "
             f"(rule: {rules.collapsed_weight:.0%} or more, verdict.collapsed_weight)"
         )
     if rules.collapsed_joints is not None and area_broken >= rules.collapsed_joints:
@@ -188,11 +211,9 @@ def state_of(area_broken: float, weight_moved: float, blocks_moved: int, rules: 
             f"{area_broken:.0%} of its joined area is broken "
             f"(rule: {rules.collapsed_joints:.0%} or more, verdict.collapsed_joints)"
         )
-    if blocks_moved:
-        return (
-            State.DAMAGED,
-            f"{_count(blocks_moved, 'block')} left {'its' if blocks_moved == 1 else 'their'} place",
-        )
+    if moved:
+        left = f"{_count(moved, 'block')} left {'its' if moved == 1 else 'their'} place"
+        return State.DAMAGED, left if out == moved else f"{left}, of which {out or 'none'} stayed out of it"
     if area_broken > rules.damaged_joints:
         return State.DAMAGED, f"{_percent(area_broken)} of its joined area is broken"
     if area_broken > 0.0:

@@ -11,6 +11,7 @@ import numpy as np
 from array_types import Array
 from coupler.verdict.damage import Blocks, Damage, Joints, damage
 from coupler.verdict.divisions import Division
+from coupler.verdict.rocking import rocking
 from coupler.verdict.watch import HIT_COLUMNS, Peaks, Watch
 
 if TYPE_CHECKING:
@@ -24,7 +25,8 @@ def verdict(structure: Structure, watch: Watch) -> dict:
     """The whole verdict; times in s, places in m, forces in N, SI throughout; None where there is no value.
 
     structure: with its present joint table."""
-    blocks = Blocks(structure.mass, watch.facts.thickness, watch.moved)
+    away, rocks = _out_of_place(structure, watch)
+    blocks = Blocks(structure.mass, watch.facts.thickness, watch.moved, away & ~rocks)
     joints = joints_of(structure)
     places = places_of(structure)
 
@@ -45,9 +47,16 @@ def verdict(structure: Structure, watch: Watch) -> dict:
         "members": members,
         "storeys": of(watch.divisions.storeys),
         "order": [m["name"] for m in sorted(_broken(members), key=lambda m: m["first_break"]["time"])],
-        "displaced": _displaced(structure, watch),
+        "displaced": _displaced(structure, watch, away, rocks),
         "hits": _hits(structure, watch),
     }
+
+
+def _out_of_place(structure: Structure, watch: Watch) -> tuple[Array, Array]:
+    """(n,) bool: blocks that are out of their place now, and those of them that rock."""
+    reach = watch.rules.moved * watch.facts.thickness
+    away = np.linalg.norm(structure.centre() - watch.facts.centre, axis=1) > reach
+    return away, rocking(structure, away, reach)
 
 
 def joints_of(structure: Structure) -> Joints:
@@ -79,10 +88,12 @@ def _reported(found: Damage, structure: Structure, places: Array) -> dict:
         "rule": found.rule,
         "blocks": found.blocks,
         "blocks_moved": found.blocks_moved,
+        "blocks_out": found.blocks_out,
         "joints": found.joints,
         "joints_broken": found.joints_broken,
         "area_broken": found.area_broken,
         "weight_moved": found.weight_moved,
+        "weight_out": found.weight_out,
         "farthest": {"block": farthest, "way": found.farthest},
         "first_break": first,
     }
@@ -126,8 +137,8 @@ def _peak(peaks: Peaks, k: int) -> dict | None:
     return {"value": float(peaks.value[k]), "time": float(peaks.time[k])}
 
 
-def _displaced(structure: Structure, watch: Watch) -> dict:
-    """Blocks that left their place, those that went farthest first."""
+def _displaced(structure: Structure, watch: Watch, away: Array, rocks: Array) -> dict:
+    """Blocks that left their place, those that went farthest first; how many of them came back, and how many rock."""
     gone = np.flatnonzero(~np.isnan(watch.left_at) & watch.judged)
     order = gone[np.argsort(-watch.moved[gone], kind="stable")]
     reported = [
@@ -136,6 +147,8 @@ def _displaced(structure: Structure, watch: Watch) -> dict:
     ]
     return {
         "blocks": len(gone),
+        "back": int((~away[gone]).sum()),
+        "rocking": int(rocks[gone].sum()),
         "first": float(watch.left_at[gone].min()) if len(gone) else None,
         "list": reported,
     }

@@ -113,6 +113,14 @@ def _displaced(reported: dict) -> Iterator[str]:
         f"{found['blocks']} of {reported['blocks']} blocks left {whose} place, the first at t = "
         f"{moment_of(found['first'])}; the farthest is {farthest['block']}, by {length(farthest['way'])}"
     )
+    if found.get("back"):
+        yield f"{found['back']} of these {'is' if found['back'] == 1 else 'are'} back in place"
+    if found.get("rocking"):
+        yield (
+            f"{found['rocking']} of these {'rocks' if found['rocking'] == 1 else 'rock'} at the end: what they belong "
+            "to tilts about an edge in its place, and its centre of mass is not beyond that; raise time.end to see "
+            "whether it comes back"
+        )
 
 
 def _hits(hits: dict) -> Iterator[str]:

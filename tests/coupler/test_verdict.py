@@ -85,11 +85,15 @@ class FakeStructure:
         self.gravity = np.array([0.0, 0.0, -G])
         self.joints = FakeJoints()
         self.x = np.array([b.centre for b in self.blocks])
+        self.turn = np.array([np.eye(3)] * 3)
         self.v = np.zeros((3, 6))
         self.broke = np.full(2, np.nan)
 
     def centre(self):
         return self.x
+
+    def rotation(self):
+        return self.turn
 
     def velocity(self):
         return self.v.copy()
@@ -187,15 +191,71 @@ def test_displaced_blocks_are_listed_from_the_farthest_on(scene):
     assert [found["block"] for found in reported] == ["wall-1", "wall-0"]
 
 
-def test_a_block_that_comes_back_has_left_its_place_all_the_same(scene):
+def test_a_block_that_comes_back_has_left_its_place_and_is_no_collapse(scene):
+    """Half of the weight that is judged."""
     s, watch, coupling = scene
     s.x = s.x + np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])
     watch.step(coupling, record(0.4))
+    assert verdict(s, watch)["state"] == "collapsed"
     s.x = s.x - np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])
     watch.step(coupling, record(0.5))
     reported = verdict(s, watch)
     assert reported["displaced"]["list"] == [{"block": "wall-1", "way": pytest.approx(0.3), "left_at": 0.4}]
-    assert reported["state"] == "collapsed"  # half of the weight of what is judged
+    assert (reported["state"], reported["weight_moved"], reported["weight_out"]) == ("damaged", 0.5, 0.0)
+    assert reported["rule"] == "1 block left its place, of which none stayed out of it"
+    assert "1 of these is back in place" in list(sentences(reported))
+
+
+def tilted(s, angle, rows=(0, 1), toe=(5.2, 0.0, 0.0), slid=0.0):
+    """Turn these blocks about a toe by an angle [rad] towards +x, and let them slide."""
+    c, d = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, 0, d], [0, 1, 0], [-d, 0, c]])
+    s.x, s.turn = s.x.copy(), s.turn.copy()
+    for i in rows:
+        s.x[i] = toe + turn @ (s.blocks[i].centre - toe) + [slid, 0, 0]
+        s.turn[i] = turn
+
+
+@pytest.mark.parametrize(
+    ("angle", "slid", "state"),
+    [(0.09, 0.0, "damaged"), (0.19, 0.0, "damaged"), (0.21, 0.0, "collapsed"), (0.09, 0.1, "collapsed")],
+)
+def test_a_wall_that_rocks_has_not_collapsed_before_its_weight_passes_the_toe(scene, angle, slid, state):
+    """The wall is 2 m high and 0.4 m thick: its centre of mass is above the toe at atan(0.2) = 0.197. One that has slid
+    by a quarter of its thickness has left its place, however it leans."""
+    s, watch, coupling = scene
+    s.broke[0] = 0.3  # it stands on the ground
+    tilted(s, angle, slid=slid)
+    watch.step(coupling, record(0.4))
+    reported = verdict(s, watch)
+    assert (reported["state"], reported["weight_moved"]) == (state, 1.0)
+    rocks = 2 if state == "damaged" else 0
+    assert reported["displaced"]["rocking"] == rocks
+    assert any("rock at the end" in line for line in sentences(reported)) == (rocks > 0)
+
+
+def test_a_block_that_falls_off_what_rocks_is_out_of_its_place(scene):
+    """The upper block is no piece of the lower one any more: the corners of its own base have moved."""
+    s, watch, coupling = scene
+    s.broke[:] = 0.3
+    tilted(s, 0.1)
+    watch.step(coupling, record(0.4))
+    reported = verdict(s, watch)
+    assert (reported["state"], reported["weight_out"], reported["displaced"]["rocking"]) == (
+        "collapsed",
+        0.5,
+        1,
+    )
+
+
+def test_a_block_that_lost_a_support_does_not_rock(scene):
+    """One edge of its base is in its place and ahead of its centre, which has fallen."""
+    s, watch, coupling = scene
+    s.broke[:] = 0.3
+    tilted(s, -0.2, rows=(1,), toe=(5.2, 0.0, 1.0))
+    s.x[1, 2] = 2.9 - s.x[1, 2]
+    watch.step(coupling, record(0.4))
+    assert verdict(s, watch)["displaced"]["rocking"] == 0
 
 
 def test_pressure_counts_only_while_a_block_is_in_its_place(scene):

@@ -142,7 +142,8 @@ def _rules(judged: dict) -> str:
         f"Rules: a block has left its place when its centre has moved by more than {percent(r['moved'])} of its "
         f"thickness (verdict.moved); damaged: more than {percent(r['damaged_joints'])} of the joined area broken "
         "(verdict.damaged_joints), or a block out of its place; collapsed: "
-        f"{percent(r['collapsed_weight'])} of the weight out of its place (verdict.collapsed_weight)"
+        f"{percent(r['collapsed_weight'])} of the weight out of its place for good (verdict.collapsed_weight), without "
+        "what came back or rocks"
         + (
             f", or {percent(by_joints)} of the joined area broken (verdict.collapsed_joints)."
             if by_joints
