@@ -158,7 +158,7 @@ class ThinFilms:
         """films (M,) bool: cells in films · in_film (S,) bool, drawn_in (S,) [m] of the wetted polygons."""
         area = domain.face_area * in_film
         covered = np.bincount(domain.face_cell, area, len(films))
-        room = domain.volume - np.bincount(domain.face_cell, area * drawn_in, len(films))
+        room = domain.volume - np.bincount(domain.face_cell, domain.face_area * drawn_in, len(films))
         thin = films & (room <= THIN * topology.size * covered)
         found = _all_around(topology.node_start, topology.node_cells, thin)
         node = np.flatnonzero(found)

@@ -75,3 +75,34 @@ def test_a_plate_leaves_a_wall_of_two_cells_alike_wherever_they_touch(axis, mirr
         later.extend(loads[1:])
     assert np.allclose(first, 320.0, rtol=0.15)
     assert np.abs(later).max() < 5.0
+
+
+@pytest.mark.parametrize("cells", [2, 3])
+def test_the_uplift_of_a_block_a_few_cells_wide_reaches_its_dry_foot(cells):
+    """Water on one side: under the block the pressure falls to zero at the other side, for block faces on planes of the
+    mesh. The water beside the drawn in sides counted as room in the films of the cells that hold both, which did not
+    fill: the uplift ended a cell before the foot, at 0.52 of the exact one under two cells and 0.71 under three, and
+    the moment about the foot was 7 % too small."""
+    wide, depth, cell, across = cells * 0.25, 1.4, 0.25, 0.5
+    block = {"name": "block", "size": [wide, across, 2.0], "centre": [1.5 + wide / 2, across / 2, 1.0]}
+    coupling = build(
+        case(
+            time={"end": 1.0, "step_max": 0.01},
+            tank={"lower": [0, 0, 0], "upper": [3, across, 2.5], "cell": cell, "smooth": ["y-", "y+"]},
+            water={"fill": [{"lower": [0, 0, 0], "upper": [1.5, across, depth]}]},
+            structure={"block": [block], "density": 3000.0},
+            contact={"stiffness": 1e9, "friction": 0.9, "restitution": 0.2},
+        ),
+        no_clock,
+    ).coupling
+    foot = np.array([1.5 + wide, across / 2, 0.0])
+    with coupling.structure:
+        loads = []
+        for _ in range(25):
+            force, moment = np.split(coupling.step(0.01).load[0], 2)
+            arm = coupling.structure.centre()[0] - foot
+            loads.append((force[2], (moment + np.cross(arm, force))[1]))
+    lift, overturning = np.mean(loads[-15:], axis=0)
+    weight = RHO * G * across
+    assert lift == pytest.approx(weight * depth * wide / 2, rel=0.1)
+    assert overturning == pytest.approx(weight * (depth**3 / 6 + depth * wide**2 / 3), rel=0.02)
