@@ -272,25 +272,27 @@ def _known(town) -> list[Footprint]:
 
 
 def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:
-    """Houses whose footprints overlap."""
+    """The first house whose footprint overlaps that of an earlier one; only houses whose boxes meet are compared."""
     from coupler.geometry.bodies import overlap_depth
+    from yade_scripts.blocks.faces import touching_bounds
 
     houses = houses_of(case, town)
     bodies = [_plan_of(house) for house in houses]
-    for j, others in enumerate(bodies):
-        for i in range(j):
-            depth, other = max(
-                ((overlap_depth(own, other, 0.0), other) for own in bodies[i] for other in others),
-                key=lambda found: found[0],
+    corners = [np.concatenate([body.vertices for body in own]) for own in bodies]
+    low, high = (np.array([getattr(x, end)(axis=0) for x in corners]) for end in ("min", "max"))
+    for i, j in sorted(touching_bounds(low, high, 0.0).tolist(), key=lambda pair: pair[::-1]):
+        depth, other = max(
+            ((overlap_depth(own, other, 0.0), other) for own in bodies[i] for other in bodies[j]),
+            key=lambda found: found[0],
+        )
+        if depth > OVERLAP * min(houses[i].size[:2]):
+            x, y = other.vertices.mean(axis=0)[:2]
+            yield (
+                path,
+                f"'{houses[j].name}' at ({x:.5g}, {y:.5g}) m overlaps '{houses[i].name}' by {depth:.3g} m "
+                "(rectangles around footprints, or their outlines): take one of them out, or join them",
             )
-            if depth > OVERLAP * min(houses[i].size[:2]):
-                x, y = other.vertices.mean(axis=0)[:2]
-                yield (
-                    path,
-                    f"'{houses[j].name}' at ({x:.5g}, {y:.5g}) m overlaps '{houses[i].name}' by {depth:.3g} m "
-                    "(rectangles around footprints, or their outlines): take one of them out, or join them",
-                )
-                return
+            return
 
 
 def _plan_of(house: Building) -> list:
