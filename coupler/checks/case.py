@@ -19,6 +19,7 @@ from coupler.checks.gauges import gauge_problems
 from coupler.checks.joints import joint_problems, pair_problems, uplift_problems
 from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems
+from coupler.checks.supports import ground_problems
 from coupler.checks.tables import table_problems
 from coupler.checks.water import water_problems
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
@@ -102,6 +103,7 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
             "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble, .file, .drawing or .town "
             "in double brackets",
         )
+    yield from ground_problems(case)
     start, ramp = case.structure.start, case.structure.ramp
     if (start == "ramp") != (ramp is not None):
         yield (

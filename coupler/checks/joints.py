@@ -72,7 +72,7 @@ def uplift_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     from coupler.step.cracks import THINNEST, least_width
     from yade_scripts.blocks.faces import both_held
 
-    blocks, planes, faces, laws = _joined_faces(case, parts)
+    blocks, planes, faces, laws = joined_faces(case, parts)
     wet = [
         face
         for face, law in zip(faces, laws)
@@ -131,12 +131,12 @@ def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
     another."""
     from yade_scripts.blocks.faces import both_held
 
-    blocks, _, faces, laws = _joined_faces(case, parts)
+    blocks, _, faces, laws = joined_faces(case, parts)
     with_joint = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
     return blocks, {row for face in with_joint for row in (face.a, face.b) if row >= 0}
 
 
-def _joined_faces(case: Case, parts: list[Part]) -> tuple[list, list, list, list]:
+def joined_faces(case: Case, parts: list[Part]) -> tuple[list, list, list, list]:
     """All blocks with the fixed solids behind them, planes, faces that touch, and the law of each pair of these."""
     from coupler.geometry.solids import obstacle_blocks
     from coupler.scene.build import joint_rules, planes_of

@@ -11,6 +11,7 @@ from coupler.case.materials import material_remarks
 from coupler.checks.gauges import gauge_remarks
 from coupler.checks.sides import side_remarks
 from coupler.checks.softness import softness_remarks
+from coupler.checks.supports import support_remarks
 from coupler.checks.thin_walls import thin_remarks
 from coupler.checks.unit_slips import unit_remarks
 from coupler.checks.water import water_remarks
@@ -29,6 +30,7 @@ def remarks(case: Case) -> list[str]:
         *_contact_remarks(case),
         *_pass_remarks(case),
         *softness_remarks(case),
+        *support_remarks(case),
         *water_remarks(case),
         *material_remarks(case),
         *_joint_remarks(case),

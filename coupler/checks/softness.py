@@ -88,12 +88,12 @@ def _falls(case: Case, parts: list[Part]) -> dict[str, float]:
         return {}
     places = np.array([block.centre[:2] for block in loose])
     bodies = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
-    found = raised_by(_bed(case, places), places, [(b.world_vertices(), b.faces) for b in bodies])
+    found = raised_by(bed_at(case, places), places, [(b.world_vertices(), b.faces) for b in bodies])
     lowest = np.array([block.world_vertices()[:, 2].min() for block in loose])
     return {block.name: fall for block, fall in zip(loose, np.maximum(lowest - found, 0.0).tolist())}
 
 
-def _bed(case: Case, places) -> Array:
+def bed_at(case: Case, places) -> Array:
     """Heights z (n,) [m] of the ground or the bed of the tank, whichever is higher, at places (n, 2) [m]."""
     tank, found = case.tank, np.full(len(places), -np.inf)
     if tank is not None:

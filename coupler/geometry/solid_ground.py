@@ -24,6 +24,16 @@ def raised_by(bed, places, solids) -> Array:
     return ground
 
 
+def tops_below(bed, places, heights, blocks) -> Array:
+    """Heights z (n,) [m] of what lies below places (n, 2) [m] at most at these heights (n,) [m]: the bed (n,) [m], or
+    the top of a block there, whatever it stands on."""
+    found = np.array(bed, float)
+    for block in blocks:
+        _, high = _upright(block.world_vertices(), block.faces, places)
+        found = np.where(high <= heights, np.maximum(found, high), found)
+    return found
+
+
 def _upright(vertices, faces, places) -> tuple[Array, Array]:
     """Ends z (n,) [m] of what a convex solid has of the vertical lines through places (n, 2) [m]; (∞, -∞) where it has
     none."""
