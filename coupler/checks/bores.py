@@ -59,7 +59,7 @@ def bores(case: Case) -> Iterator[Bore]:
     a bore on its way."""
     if case.water is None or case.tank is None or not case.tank.is_box or case.structure is None:
         return
-    found = _structure(case)
+    found = structure_of(case)
     if found is None:
         return
     name, low, high = found
@@ -173,7 +173,7 @@ def _root(value: Callable[[float], float], low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-def _structure(case: Case) -> tuple[str, np.ndarray, np.ndarray] | None:
+def structure_of(case: Case) -> tuple[str, np.ndarray, np.ndarray] | None:
     """Name, lower and upper corner (3,) [m] of the structure: the bodies that [verdict] names, else all that can
     move."""
     wanted = set(case.verdict.on)

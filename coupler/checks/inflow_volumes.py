@@ -97,7 +97,15 @@ def _over_its_crest(case: Case, i: int, spec, entered: _Entered) -> Iterator[Pro
         float((entered.volume - rate * entered.time).max()),
         room_under(tank, case.water.fill, highest),
     )
-    if brought > room:
+    if room < 0.0 and spec.kind != "bore":
+        stands = max(fill.upper[2] for fill in case.water.fill)
+        yield (
+            ("water", "inflow", i),
+            f"comes in with {name} at z = {highest:.3g} m, but the water of the tank stands above that from the start "
+            f"(water.fill up to z = {stands:g} m): it would fall into the wave; give both the same still water"
+            + (f" (level = {spec.level:g} m)" if spec.kind != "record" else ""),
+        )
+    elif brought > room:
         way_out = (
             f"more than {' and '.join(ways)} can let out" if ways else "without another side to leave by"
         )

@@ -8,6 +8,7 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.materials import material_remarks
+from coupler.checks.arrivals import arrival_remarks
 from coupler.checks.gauges import gauge_remarks
 from coupler.checks.sides import side_remarks
 from coupler.checks.softness import softness_remarks
@@ -32,6 +33,7 @@ def remarks(case: Case) -> list[str]:
         *softness_remarks(case),
         *support_remarks(case),
         *water_remarks(case),
+        *arrival_remarks(case),
         *material_remarks(case),
         *_joint_remarks(case),
         *_loose_remarks(case),

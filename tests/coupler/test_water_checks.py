@@ -107,6 +107,9 @@ def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
     assert found(1.0, end=1.0) == []
     assert found(1.0, absorbs=True) == []
     assert found(3.0) == []
+    (low,) = found(3.0, level=0.35)
+    assert "the crest at z = 0.45 m, but the water of the tank stands above that" in low
+    assert "(water.fill up to z = 0.5 m)" in low  # not: room for -0.03 m3
 
 
 def test_a_wave_that_draws_its_tank_below_its_trough_is_refused():
@@ -374,7 +377,9 @@ def test_the_split_of_a_case_is_that_of_its_mesh():
 def test_a_wave_that_has_begun_before_the_start_is_remarked():
     """At the first step it would come in as a jump, and strike."""
     wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.05}
-    early, late = (remarks(case({"inflow": [wave | {"crest": crest}]})) for crest in (0.6, 2.0))
+    early, late = (
+        remarks(case({"inflow": [wave | {"crest": crest}]}, time={"end": 3.0})) for crest in (0.6, 2.0)
+    )
     assert "59 % of its height" in early[0]
     assert late == []
 
