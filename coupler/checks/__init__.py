@@ -8,7 +8,7 @@ places, motion, joints, softness             bodies, prescribed motions, joints,
 water, inflows                               walls and water too thin for the cells; inflows and seas
 gauges                                       gauges: places, and what they would read
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
-arrivals                                     waves that come after the end of the run
+arrivals, records                            waves that come after the end of the run; records of inflows
 supports                                     what carries blocks: parts that hang, a ground off the floor of the tank
 sides                                        loose blocks that rub on the sides of a slice
 tables                                       results that would be written to one place

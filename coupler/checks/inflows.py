@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.types import KeyPath, Problem
 from coupler.checks.inflow_volumes import depth_behind, opposite
+from coupler.checks.records import STILL, record_remarks, step_at_start
 from coupler.geometry.cell_sizes import edges_at, has_equal_cells, places_in_box
 from coupler.geometry.stretches import axes_of
 from coupler.geometry.tank_mesh import floor_along, mean_bed
@@ -38,9 +38,6 @@ WHOLE_DEPTH = 0.9
 LEAST_ACROSS = 3
 """Cells between a sea, or a side that absorbs, and the side opposite to it. With two, a sea before a tank that was
 partly dry filled all of its width at once, and the volume was off by 3 % after some steps."""
-
-STILL = 0.1
-"""Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
 
 RISES = 0.1
 """Share of a cell by which a stream may raise the level of a sea that absorbs, without a remark."""
@@ -258,9 +255,11 @@ def inflow_remarks(case: Case) -> Iterator[str]:
         if spec.kind in ("solitary", "n-wave") or getattr(spec, "ahead", None) is not None:
             yield from _still_water(case, spec)
         if spec.kind == "record":
-            yield from _held_ends(case, spec)
+            yield from record_remarks(case, spec)
         if spec.kind in ("solitary", "n-wave"):
             yield from _begun(spec, _depth(case, spec), case.case.gravity)
+    for sea in case.water.sea if case.water and case.tank else ():
+        yield from step_at_start(case, sea.side, "the sea stands", level_at_start(sea))
 
 
 def _streams_into_absorbing_seas(case: Case) -> Iterator[str]:
@@ -348,21 +347,3 @@ def _wave(spec, depth: float, gravity: float) -> tuple[str, str, Callable[[float
 def _share_of_n_wave(phase: float) -> float:
     phase = min(max(phase, math.atanh(math.sqrt(1.0 / 3.0))), 100.0)
     return 1.5 * math.sqrt(3.0) * math.tanh(phase) / math.cosh(phase) ** 2
-
-
-def _held_ends(case: Case, spec) -> Iterator[str]:
-    """Records that do not cover the run: their ends are held."""
-    try:
-        found = record_of(spec)
-    except RecordError:
-        return
-    first, last = float(found.time[0]), float(found.time[-1])
-    name = Path(spec.path).name
-    if first > 0.0:
-        yield f"{name} begins at {first:g} s of the run: its first level and velocity are held from 0 to then"
-    if last < case.time.end:
-        level, velocity = float(found.level[-1].mean()), float(found.velocity[-1].mean())
-        yield (
-            f"{name} ends at {last:g} s, before the run does ({case.time.end:g} s): its last level ({level:.4g} m) and "
-            f"velocity ({velocity:.4g} m/s) are held from then on"
-        )
