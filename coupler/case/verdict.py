@@ -24,7 +24,8 @@ class Verdict(Section):
     )
     damaged_joints: Annotated[float, InSI("", ge=0, le=1)] = Field(
         0.0,
-        description="damaged from more than this share of the joined area broken, or a block out of its place",
+        description="damaged from more than this share of the joined area failed, in joints that broke or tore in "
+        "part, or a block out of its place",
     )
     collapsed_weight: Annotated[float, InSI("", gt=0, le=1)] = Field(
         0.2,

@@ -25,6 +25,7 @@ COLUMNS = tuple(
         ("state", "", "stands, damaged or collapsed, by the rules of [verdict]"),
         ("joints", "1", "its joints"),
         ("joints_broken", "1", "those that broke"),
+        ("joints_torn", "1", "those that hold by a part of their face, the rest of which has failed"),
         ("area_broken", "1", "share of its joined area that broke"),
         ("weight_moved", "1", "share of its weight that left its place"),
         ("first_break", "s", "when the first joint broke; empty if none did"),
@@ -60,7 +61,7 @@ def _row(body: dict, members: list[dict], watch: Watch, maps: Maps) -> tuple:
     nan = float("nan")
     return (
         body["name"], *watch.foot[k].tolist(), body["state"], body["joints"], body["joints_broken"],
-        body["area_broken"], body["weight_moved"], first["time"] if first else nan, walls,
+        body["joints_torn"], body["area_broken"], body["weight_moved"], first["time"] if first else nan, walls,
         force.get("value", 0.0), force.get("time", nan), *watch.impulse[k, :2].tolist(), moment.get("value", 0.0),
         moment.get("time", nan), *flood,
     )  # fmt: skip

@@ -88,7 +88,9 @@ class _Group(_Part):
     blocks_out: Whole | None = None
     joints: Whole
     joints_broken: Whole
+    joints_torn: Whole = 0
     area_broken: Number
+    area_torn: Number = 0.0
     weight_moved: Number
     weight_out: Number | None = None
     farthest: _Way

@@ -4,10 +4,13 @@ From plain arrays it makes one `Damage` for each group, for any division of the 
 building, storeys, buildings of a town. It needs neither a run nor YADE, so the table of a finished run is enough.
 
 State       rule (keys of [verdict])
-stands      no more than `damaged_joints` of the joined area is broken, and no block has left its place
+stands      no more than `damaged_joints` of the joined area is broken or torn, and no block has left its place
 damaged     anything else that is not collapsed
 collapsed   at least `collapsed_weight` of the weight has left its place and stays out of it, or at least
             `collapsed_joints` of the joined area is broken, where the case gives that key
+
+A joint is broken when it has failed everywhere, and torn when it has failed over a part of its face and holds by the
+rest: the base of a wall that gapes at one edge is torn for as long as the other edge is pressed.
 
 A block has left its place when its centre has moved by `moved` of its thickness (the smallest width across a face
 through its centre of mass, as for limits.overlap). One that came back or rocks (`rocking.py`) does not stay out of it.
@@ -72,17 +75,18 @@ class Blocks:
 @dataclass(frozen=True)
 class Joints:
     """a, b (J,) rows of the blocks, negative for the ground · area (J,) [m²] · broken (J,) [s]: time of failure, NaN
-    while it holds"""
+    while it holds · torn (J,): share of the area that has failed"""
 
     a: Ints
     b: Ints
     area: Floats
     broken: Floats
+    torn: Floats
 
     @classmethod
     def none(cls) -> Joints:
         """No joints, for blocks without any."""
-        return cls(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
+        return cls(np.zeros(0, int), np.zeros(0, int), *np.zeros((3, 0)))
 
 
 @dataclass(frozen=True)
@@ -90,10 +94,11 @@ class Damage:
     """What happened to one group.
 
     blocks, blocks_moved, blocks_out: number of all, of those that left their place, and of those that stay out of it ·
-    joints, joints_broken · area_broken: share of the joined area · weight_moved, weight_out: share of the weight that
-    left its place, and that stays out of it · farthest [m] and farthest_block: the way of the block that moved most,
-    and its row · first_break [s] and first_joint: time and row of the first joint that broke, None and -1 without one ·
-    state · rule: the sentence that decided it
+    joints, joints_broken, joints_torn: number of all, of the broken and of the torn · area_broken: share of the joined
+    area in broken joints, area_torn: that which has failed in torn ones · weight_moved, weight_out: share of the weight
+    that left its place, and that stays out of it · farthest [m] and farthest_block: the way of the block that moved
+    most, and its row · first_break [s] and first_joint: time and row of the first joint that broke, None and -1
+    without one · state · rule: the sentence that decided it
     """
 
     name: str
@@ -102,7 +107,9 @@ class Damage:
     blocks_out: int
     joints: int
     joints_broken: int
+    joints_torn: int
     area_broken: float
+    area_torn: float
     weight_moved: float
     weight_out: float
     farthest: float
@@ -173,9 +180,12 @@ def _of_group(
     broken = own[np.isfinite(joints.broken[own])]
     first = broken[np.argmin(joints.broken[broken])] if len(broken) else -1
     farthest = rows[np.argmax(blocks.moved[rows])] if len(rows) else -1
-    area = _share(joints.area[broken].sum(), joints.area[own].sum())
+    torn = own[(joints.torn[own] > 0.0) & ~np.isfinite(joints.broken[own])]
+    joined = joints.area[own].sum()
+    area = _share(joints.area[broken].sum(), joined)
+    area_torn = _share((joints.area[torn] * joints.torn[torn]).sum(), joined)
     weight, weight_out = (_share(blocks.mass[of].sum(), blocks.mass[rows].sum()) for of in (left, out))
-    state, rule = state_of(area, weight_out, (len(left), len(out)), rules)
+    state, rule = state_of(area, weight_out, (len(left), len(out)), rules, area_torn)
     return Damage(
         name=name,
         blocks=len(rows),
@@ -183,7 +193,9 @@ def _of_group(
         blocks_out=len(out),
         joints=len(own),
         joints_broken=len(broken),
+        joints_torn=len(torn),
         area_broken=area,
+        area_torn=area_torn,
         weight_moved=weight,
         weight_out=weight_out,
         farthest=float(blocks.moved[farthest]) if farthest >= 0 else 0.0,
@@ -196,11 +208,19 @@ def _of_group(
 
 
 def state_of(
-    area_broken: float, weight_out: float, blocks_moved: tuple[int, int], rules: Rules
+    area_broken: float,
+    weight_out: float,
+    blocks_moved: tuple[int, int],
+    rules: Rules,
+    area_torn: float = 0.0,
 ) -> tuple[State, str]:
     """The state and the rule that decided it, from shares of the joined area and of the weight, and from the numbers of
     blocks that left their place and that stay out of it."""
     moved, out = blocks_moved
+    failed = min(area_broken + area_torn, 1.0)
+    which = (
+        "torn, though no joint broke" if area_broken == 0.0 else "broken or torn" if area_torn else "broken"
+    )
     if weight_out >= rules.collapsed_weight and out:
         return State.COLLAPSED, (
             f"{weight_out:.0%} of its weight left its place "
@@ -214,11 +234,11 @@ def state_of(
     if moved:
         left = f"{_count(moved, 'block')} left {'its' if moved == 1 else 'their'} place"
         return State.DAMAGED, left if out == moved else f"{left}, of which {out or 'none'} stayed out of it"
-    if area_broken > rules.damaged_joints:
-        return State.DAMAGED, f"{_percent(area_broken)} of its joined area is broken"
-    if area_broken > 0.0:
+    if failed > rules.damaged_joints:
+        return State.DAMAGED, f"{_percent(failed)} of its joined area is {which}"
+    if failed > 0.0:
         return State.STANDS, (
-            f"{_percent(area_broken)} of its joined area is broken "
+            f"{_percent(failed)} of its joined area is {which} "
             f"(rule: damaged from more than {rules.damaged_joints:.0%}, verdict.damaged_joints)"
         )
     return State.STANDS, "no joint broke and no block left its place"

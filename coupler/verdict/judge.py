@@ -64,7 +64,7 @@ def joints_of(structure: Structure) -> Joints:
     table = structure.joint_table()
     if table is None:
         return Joints.none()
-    return Joints(table.a, table.b, table.area, np.where(table.alive, np.nan, table.failure_time))
+    return Joints(table.a, table.b, table.area, np.where(table.alive, np.nan, table.failure_time), table.torn)
 
 
 def places_of(structure: Structure) -> Array:
@@ -91,7 +91,9 @@ def _reported(found: Damage, structure: Structure, places: Array) -> dict:
         "blocks_out": found.blocks_out,
         "joints": found.joints,
         "joints_broken": found.joints_broken,
+        "joints_torn": found.joints_torn,
         "area_broken": found.area_broken,
+        "area_torn": found.area_torn,
         "weight_moved": found.weight_moved,
         "weight_out": found.weight_out,
         "farthest": {"block": farthest, "way": found.farthest},

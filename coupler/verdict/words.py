@@ -58,14 +58,22 @@ def point(place: Sequence[float]) -> str:
 def _first_break(reported: dict) -> Iterator[str]:
     if not reported["joints"]:
         return
-    first = reported["first_break"]
+    first, torn = reported["first_break"], reported.get("joints_torn", 0)
+    its = "its" if torn == 1 else "their"
     if first is None:
-        yield f"no joint of {reported['joints']} broke"
+        part = f", {torn} are torn: they hold by a part of their face" if torn > 1 else ""
+        part = ", one is torn: it holds by a part of its face" if torn == 1 else part
+        yield f"no joint of {reported['joints']} broke{part}"
         return
     yield (
         f"first break at t = {moment_of(first['time'])} at {point(first['place'])}, between {first['blocks'][0]} "
         f"and {first['blocks'][1]}; {reported['joints_broken']} of {reported['joints']} joints broke, "
         f"{reported['area_broken']:.0%} of the joined area"
+        + (
+            f"; {torn} more {'holds' if torn == 1 else 'hold'} by a part of {its} face, the rest is torn"
+            if torn
+            else ""
+        )
     )
 
 

@@ -9,13 +9,14 @@ NEVER = np.nan
 RULES = Rules(moved=0.1, damaged_joints=0.0, collapsed_weight=0.5)
 
 
-def two_walls(moved=(0.0,) * 4, broken=(NEVER,) * 4, thickness=(1.0,) * 4):
+def two_walls(moved=(0.0,) * 4, broken=(NEVER,) * 4, thickness=(1.0,) * 4, torn=(0.0,) * 4, rules=RULES):
     """Two walls of two blocks each, 1 m thick; joints: within either wall, between the two, and to the ground."""
     blocks = Blocks(np.array([1.0, 3.0, 2.0, 2.0]), np.array(thickness), np.array(moved))
     joints = Joints(
-        np.array([0, 2, 1, 0]), np.array([1, 3, 2, -1]), np.array([1.0, 2.0, 4.0, 3.0]), np.array(broken)
-    )
-    return damage(np.array([0, 0, 1, 1]), ["left", "right"], blocks, joints, RULES)
+        np.array([0, 2, 1, 0]), np.array([1, 3, 2, -1]), np.array([1.0, 2.0, 4.0, 3.0]), np.array(broken),
+        np.where(np.isfinite(broken), 1.0, torn),
+    )  # fmt: skip
+    return damage(np.array([0, 0, 1, 1]), ["left", "right"], blocks, joints, rules)
 
 
 def test_what_nothing_happened_to_stands():
@@ -30,6 +31,24 @@ def test_a_crack_between_two_groups_is_damage_to_both():
     assert left.area_broken == pytest.approx(4.0 / 8.0)  # of 1 + 4 + 3 m2
     assert right.area_broken == pytest.approx(4.0 / 6.0)
     assert left.first_joint == right.first_joint == 2
+
+
+def test_a_joint_that_holds_by_one_edge_is_damage():
+    """Its base torn over 2/3 of 3 m², of 1 + 4 + 3 m²: a wall that leans on its toe does not just stand."""
+    left, right = two_walls(torn=(0.0, 0.0, 0.0, 2.0 / 3.0))
+    assert (left.state, left.joints_broken, left.joints_torn) == (State.DAMAGED, 0, 1)
+    assert left.area_torn == pytest.approx(2.0 / 8.0)
+    assert left.rule == "25% of its joined area is torn, though no joint broke"
+    assert (right.state, right.joints_torn) == (State.STANDS, 0)
+    left, _ = two_walls(torn=(0.0, 0.0, 0.0, 2.0 / 3.0), rules=Rules(damaged_joints=0.3))
+    assert (left.state, left.rule[:30]) == (State.STANDS, "25% of its joined area is torn")
+
+
+def test_what_is_broken_and_what_is_torn_add_up():
+    left, _ = two_walls(broken=(0.5, NEVER, NEVER, NEVER), torn=(0.0, 0.0, 0.0, 1.0 / 3.0))
+    assert (left.joints_broken, left.joints_torn) == (1, 1)
+    assert (left.area_broken, left.area_torn) == pytest.approx((1.0 / 8.0, 1.0 / 8.0))
+    assert left.rule == "25% of its joined area is broken or torn"
 
 
 def test_the_first_break_is_the_earliest_of_the_group():
@@ -69,7 +88,7 @@ def test_each_block_is_measured_by_its_own_thickness():
 def test_broken_joints_alone_are_a_collapse_only_where_the_case_says_so():
     blocks, joints = (
         Blocks(np.ones(1), np.ones(1), np.zeros(1)),
-        Joints(*map(np.array, ([0], [-1], [1.0], [0.3]))),
+        Joints(*map(np.array, ([0], [-1], [1.0], [0.3], [1.0]))),
     )
     label, names = np.zeros(1, int), ["wall"]
     assert damage(label, names, blocks, joints, Rules())[0].state is State.DAMAGED

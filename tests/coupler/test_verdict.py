@@ -87,7 +87,7 @@ class FakeStructure:
         self.x = np.array([b.centre for b in self.blocks])
         self.turn = np.array([np.eye(3)] * 3)
         self.v = np.zeros((3, 6))
-        self.broke = np.full(2, np.nan)
+        self.broke, self.torn = np.full(2, np.nan), np.zeros(2)
 
     def centre(self):
         return self.x
@@ -105,6 +105,7 @@ class FakeStructure:
             area=np.array([0.4, 0.4]),
             alive=np.isnan(self.broke),
             failure_time=self.broke,
+            torn=np.where(np.isnan(self.broke), self.torn, 1.0),
         )
 
     def joint_polygons(self, at_start=False):
@@ -149,6 +150,20 @@ def test_nothing_happened(scene):
     assert reported["largest"]["force"] is None
     assert "no joint of 2 broke" in list(sentences(reported))
     assert "until the run ended at t = 0.1 s" in unreached(reported, 0.1)
+
+
+def test_a_base_that_gapes_is_said_to_hold_by_a_part_of_its_face(scene):
+    s, watch, coupling = scene
+    s.torn[0] = 5.0 / 18.0
+    watch.step(coupling, record(0.1))
+    reported = verdict(s, watch)
+    assert (reported["state"], reported["joints_torn"]) == ("damaged", 1)
+    said = list(sentences(reported))
+    assert said[0] == "DAMAGED: 14% of its joined area is torn, though no joint broke"
+    assert "no joint of 2 broke, one is torn: it holds by a part of its face" in said
+    s.broke[1] = 0.2
+    watch.step(coupling, record(0.2))
+    assert any("1 more holds by a part of its face" in line for line in sentences(verdict(s, watch)))
 
 
 def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(scene):

@@ -27,8 +27,9 @@ class JointTable:
     """One row a joint. a, b: blocks (b = -1: ground or wall) · face_a, face_b: their faces (-1: fixed plane)
 
     area [m²] · centre (J, 3) [m] and normal (J, 3) out of a, now (both follow block a) · damage: largest λ/δ_f of the
-    joint's points, weighted mean in `mean_damage` · opening, sliding [m] means · mode_mix: share of shear in the
-    effective opening, 0 (opening) .. 1 (shear), frozen at failure · stored, dissipated, damped [J]
+    joint's points, weighted mean in `mean_damage` · torn: share of its area whose points have failed, 1 once
+    it is not alive · opening, sliding [m] means · mode_mix: share of shear in the effective opening, 0 (opening) to
+    1 (shear), frozen at failure · stored, dissipated, damped [J]
     failure_time [s], nan while alive · intact: nothing broken · alive: still carries tension
     """
 
@@ -41,6 +42,7 @@ class JointTable:
     normal: Floats
     damage: Floats
     mean_damage: Floats
+    torn: Floats
     opening: Floats
     sliding: Floats
     mode_mix: Floats
@@ -313,7 +315,11 @@ class Joints:
         """The joints now. x (n, 3), R (n, 3, 3): places of the blocks."""
         opening = self.final_openings.copy()
         opening[self.live] = self.openings(self.live, x, R)
-        mean = np.bincount(self.joint_of, self._ratio() * self.weight, minlength=len(self)) / self.area
+        ratio = self._ratio()
+        mean, torn = (
+            np.bincount(self.joint_of, share * self.weight, minlength=len(self)) / self.area
+            for share in (ratio, ratio >= 1.0)
+        )
         centre = x[self.a] + np.einsum("nij,nj->ni", R[self.a], self._centre_in_a())
         normal = np.einsum("nij,nj->ni", R[self.a], self.normal[:, 0])
         shear = self.beta * opening[:, 1]
@@ -329,6 +335,7 @@ class Joints:
             normal=normal,
             damage=self.damage(),
             mean_damage=mean,
+            torn=np.where(self.alive, torn, 1.0),
             opening=opening[:, 0],
             sliding=opening[:, 1],
             mode_mix=mix,

@@ -95,7 +95,7 @@ def _group(group: dict, judged: dict, loads: bool) -> list[str]:
         name_of(judged, group["name"]),
         group["word"],
         moment_of(first["time"]) if first else "–",
-        f"{group['joints_broken']} of {group['joints']}" if group["joints"] else "–",
+        _joints(group) if group["joints"] else "–",
         percent(group["area_broken"]) if group["joints"] else "–",
         f"{group['blocks_moved']} of {group['blocks']}",
         length(group["farthest"]["way"]),
@@ -108,6 +108,11 @@ def _group(group: dict, judged: dict, loads: bool) -> list[str]:
             length(depth["value"]) if depth else "–",
         ]
     return row
+
+
+def _joints(group: dict) -> str:
+    torn = group.get("joints_torn", 0)
+    return f"{group['joints_broken']} of {group['joints']}" + (f", {torn} torn" if torn else "")
 
 
 def _displaced(judged: dict) -> str:
@@ -140,8 +145,8 @@ def _rules(judged: dict) -> str:
     by_joints = r["collapsed_joints"]
     return (
         f"Rules: a block has left its place when its centre has moved by more than {percent(r['moved'])} of its "
-        f"thickness (verdict.moved); damaged: more than {percent(r['damaged_joints'])} of the joined area broken "
-        "(verdict.damaged_joints), or a block out of its place; collapsed: "
+        f"thickness (verdict.moved); damaged: more than {percent(r['damaged_joints'])} of the joined area broken or "
+        "torn (verdict.damaged_joints), or a block out of its place; collapsed: "
         f"{percent(r['collapsed_weight'])} of the weight out of its place for good (verdict.collapsed_weight), without "
         "what came back or rocks"
         + (
