@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 MOST_LISTED = 25
 """Blocks that left their place, and hits, that are listed one by one; tables hold them all."""
 
+LEAVING = 0.1
+"""Share of the way to where a block has left its place from which it is followed as one that leaves it."""
+
 
 def verdict(structure: Structure, watch: Watch) -> dict:
     """The whole verdict; times in s, places in m, forces in N, SI throughout; None where there is no value.
@@ -48,6 +51,7 @@ def verdict(structure: Structure, watch: Watch) -> dict:
         "storeys": of(watch.divisions.storeys),
         "order": [m["name"] for m in sorted(_broken(members), key=lambda m: m["first_break"]["time"])],
         "displaced": _displaced(structure, watch, away, rocks),
+        "leaving": _leaving(structure, watch),
         "hits": _hits(structure, watch),
     }
 
@@ -153,6 +157,33 @@ def _displaced(structure: Structure, watch: Watch, away: Array, rocks: Array) ->
         "rocking": int(rocks[gone].sum()),
         "first": float(watch.left_at[gone].min()) if len(gone) else None,
         "list": reported,
+    }
+
+
+def _leaving(structure: Structure, watch: Watch) -> dict | None:
+    """The judged block that leaves its place next at its present speed away from it: its way [m], that speed [m/s] and
+    the time [s] until then. None while none is farther out than ever and has gone LEAVING of the way to where it has
+    left: the rest swings or trembles."""
+    limit = watch.rules.moved * watch.facts.thickness
+    way = structure.centre() - watch.facts.centre
+    gone = np.linalg.norm(way, axis=1)
+    away = np.einsum("ni,ni->n", structure.velocity()[:, :3], way) / np.where(gone > 0.0, gone, 1.0)
+    going = (
+        watch.judged
+        & np.isnan(watch.left_at)
+        & (gone > LEAVING * limit)
+        & (gone >= watch.moved)
+        & (away > 0.0)
+    )
+    if not going.any():
+        return None
+    left = np.where(going, (limit - gone) / np.where(going, away, 1.0), np.inf)
+    i = int(left.argmin())
+    return {
+        "block": structure.names[i],
+        "way": float(gone[i]),
+        "speed": float(away[i]),
+        "within": float(left[i]),
     }
 
 

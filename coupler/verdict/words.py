@@ -10,6 +10,9 @@ from coupler.verdict.divisions import in_words
 MOST_IN_ORDER = 12
 """Walls and floors whose first break is reported in a line; the table has all."""
 
+SOON = 0.5
+"""Share of the length of a run within which a block that moves at its end would leave its place."""
+
 
 def headline(reported: dict) -> str:
     """The answer in one line: COLLAPSED: 63% of its weight left its place (...)."""
@@ -42,6 +45,19 @@ def unfinished(time: float, end: float) -> str:
     return (
         f"the run ended early, at t = {moment_of(time)} of {moment_of(end)}: "
         "this verdict says nothing about what comes later"
+    )
+
+
+def unsettled(reported: dict, time: float) -> str | None:
+    """A sentence where a run of this length [s] ends while a block of a structure that has not collapsed moves out of
+    its place, and would have left it soon; None otherwise."""
+    found = reported["leaving"]
+    if found is None or reported["state"] == "collapsed" or found["within"] > SOON * time:
+        return None
+    return (
+        f"'{found['block']}' still moves as the run ends at t = {moment_of(time)}: it is {length(found['way'])} from "
+        f"its place, and at {quantity(found['speed'], 'm/s')} it leaves it within {moment_of(found['within'])}; this "
+        "verdict is not the last one: raise time.end"
     )
 
 

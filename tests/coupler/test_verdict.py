@@ -15,7 +15,7 @@ from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import _largest, places_of, verdict
 from coupler.verdict.watch import Peaks, Watch
-from coupler.verdict.words import sentences, unreached
+from coupler.verdict.words import sentences, unreached, unsettled
 from tests.coupler.resumed import DRY, begin
 from tests.coupler.test_docs import FIGURES
 from yade_scripts.blocks.block import Block
@@ -204,6 +204,32 @@ def test_displaced_blocks_are_listed_from_the_farthest_on(scene):
     watch.step(coupling, record(0.4))
     reported = verdict(s, watch)["displaced"]["list"]
     assert [found["block"] for found in reported] == ["wall-1", "wall-0"]
+
+
+def test_a_block_on_its_way_out_as_the_run_ends_is_doubted(scene):
+    """30 mm of the 40 from which it has left its place, at 50 mm/s: after 0.2 s more it has. Blocks that vibrate or
+    come back are no doubt, nor is a run of 0.1 s, which says nothing about so long."""
+    s, watch, coupling = scene
+    s.x = s.x + np.array([[0, 0, 0], [0.03, 0, 0], [0, 0, 0]])
+    for speed, length, doubted in (
+        (0.05, 1.0, True),
+        (-0.05, 1.0, False),
+        (0.0, 1.0, False),
+        (0.05, 0.1, False),
+    ):
+        s.v[1, 0] = speed
+        watch.step(coupling, record(length))
+        reported = verdict(s, watch)
+        assert reported["state"] == "stands"
+        assert bool(unsettled(reported, length)) is doubted
+        if doubted:
+            assert "'wall-1' still moves as the run ends at t = 1 s: it is 30 mm from its place" in unsettled(
+                reported, length
+            )
+            assert reported["leaving"]["within"] == pytest.approx(0.2)
+    s.v[1, 0] = 0.05
+    s.x[1, 0] -= 0.001  # it swings, and was farther out before
+    assert verdict(s, watch)["leaving"] is None
 
 
 def test_a_block_that_comes_back_has_left_its_place_and_is_no_collapse(scene):
