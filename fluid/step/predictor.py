@@ -31,6 +31,8 @@ from fluid.pressure.projection import (
 )
 from fluid.pressure.waterline import WaterlineLoad
 from fluid.sides.outflow import Outflow
+from fluid.step.carried import carried_by_fluxes
+from fluid.step.kick import kicked
 from fluid.step.remainders import carried_remainder
 from fluid.surface.cavities import air_on_walls
 from fluid.surface.level_set import redistance
@@ -120,7 +122,7 @@ def predicted(water, dt: float) -> PressureProblem:
     crossing, parameters = water.crossing(), water.parameters
     theta, kick = water.theta(dt, crossing), water.kick_factor(crossing)
     u_adv, phi = _transported(water, dt, theta, kick)
-    found = water.carried(dt, theta, kick)
+    found = carried_by_fluxes(water, dt, theta, kick)
     carried = added(found.water, found.swept)
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
     if left is not None:
@@ -210,22 +212,6 @@ def _fallen(first, last, u, gained, active, out):
             out[i, k] = u[i, k] + gained[k] if active[i] else 0.0
 
 
-def kick_factor(acceleration, calm: float, fast: float, size):
-    """f = min(1, a_max / |a|) (N,) with a_max = max(calm [m/s²], fast [m²/s²] / size (N,) [m]): see
-    `Water.kick_factor`."""
-    out = np.empty(len(acceleration))
-    over(_factor, len(out), acceleration, calm, fast, size, out)
-    return out
-
-
-@ranged
-def _factor(first, last, a, calm, fast, size, out):
-    for i in range(first, last):
-        square, out[i] = a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2], 1.0
-        if square > 0.0:  # most of a tank is air at rest
-            out[i] = min(1.0, max(calm, fast / size[i]) / max(np.sqrt(square), 1e-300))
-
-
 def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
@@ -254,24 +240,6 @@ def _transported(water, dt, theta, kick):
     water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))
     water.hold(u_adv, water.time + dt, phi < 0.0)
     return u_adv, phi
-
-
-def kicked(velocity, acceleration, kick, dt: float, whole: float, middle: float):
-    """Velocity (N, 3) [m/s] after the shares `whole` and `middle` of a time dt [s] at the acceleration (N, 3) [m/s²]
-    times kick (N,)."""
-    u_hat, u_m = np.empty_like(velocity), np.empty_like(velocity)
-    over(_kicked, len(velocity), velocity, acceleration, kick, dt, whole, middle, u_hat, u_m)
-    return u_hat, u_m
-
-
-@ranged
-def _kicked(first, last, velocity, acceleration, kick, dt, whole, middle, u_hat, u_m):
-    for i in range(first, last):
-        factor = dt * kick[i]
-        for k in range(3):
-            a = factor * acceleration[i, k]
-            u_hat[i, k] = velocity[i, k] + whole * a
-            u_m[i, k] = velocity[i, k] + middle * a
 
 
 @ranged

@@ -18,9 +18,8 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors
-from fluid.domain.continued_nodes import pick_old_cells
 from fluid.domain.layers import layers_around
-from fluid.domain.physical_domain import carry, wetted_coupling
+from fluid.domain.physical_domain import wetted_coupling
 from fluid.domain.topology import Graph, Topology
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
@@ -28,17 +27,18 @@ from fluid.pressure.displaced import taken_from_nodes
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
+from fluid.step.kick import kick_factor
+from fluid.step.moved_solids import carry_to
 from fluid.step.parameters import WaterParameters
 from fluid.step.potential import level_energy, potential_energy
-from fluid.step.predictor import kick_factor, kicked, predicted
+from fluid.step.predictor import predicted
 from fluid.step.report import StepReport
+from fluid.step.start import flux_at_start, start_beside_sides, start_moving, surface_of
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gathered, pace
 from fluid.surface.cavities import on_one_side
 from fluid.surface.extrapolation import BAND, fill_missing
-from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
-from fluid.surface.volume import FluxAhead, nodal_volume, renumbering, room_of_heirs
-from fluid.transport.surface_momentum import Carried
-from fluid.transport.swept_volume import swept
+from fluid.surface.level_set import FAR, drain_films
+from fluid.surface.volume import nodal_volume
 from kernels.decorators import ranged
 from kernels.threads import over
 
@@ -47,10 +47,6 @@ if TYPE_CHECKING:
 
 START_STEPS = 2
 """Steps of a start, which are implicit, and after which the surface lags by no more than by half of each."""
-AT_LEVEL = 1e-6
-"""Share of a cell by which water at the start may be off the level of an absorbing side and still count as level."""
-MOST_READINGS = 10
-"""Most times that an absorbing side reads the water at the start."""
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest, h the least size of the cells at the surface ..."""
 AT_SURFACE = 3.0
@@ -124,10 +120,10 @@ class Water:
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
         given = np.zeros(n, bool)
         if sides is None:
-            self.level_set = self._surface_of(level, given)
+            self.level_set = surface_of(self, level, given)
         else:
             given[sides.nodes()] = True
-            self._start_beside_sides(level, given, velocity)
+            start_beside_sides(self, level, given, velocity)
         drain_films(self.level_set, self.topology.node_size)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.air, self.vents = None, tuple(vents)
@@ -148,63 +144,12 @@ class Water:
         self.initial_volume = self.conserved_volume
         self.given_by_films = np.zeros(n)
         """(N,) [m³/s] that films and their rims gave each other over the last step (`films.py`)."""
-        self._find_band()
+        self.find_band()
         self._start_speed = 0.0
         if velocity is not None:
-            self._start_moving(velocity)
+            start_moving(self, velocity)
         self.renumbered, self.left_behind = None, None
-        self.flux = self._flux_at_start()
-
-    def _surface_of(self, level, given):
-        """φ (N,) [m] of a surface at the start; given (N,) bool: nodes where it is known."""
-        level = self._dry_if_inactive(level)
-        level = redistance(self.topology, level, self.topology.node_size, rescale=False)
-        return no_steeper(self.topology, level, given)
-
-    def _start_beside_sides(self, level, given, velocity) -> None:
-        """φ with the levels of the sides, the absorbing ones set to the water at the start, which may be lower beside
-        them: a side at its own level at the start would give water that it takes back in the first step. What such a
-        side reads depends on the surface that its level makes, so this goes on until both agree."""
-        self.level_set, self.velocity = level, np.zeros((len(level), 3)) if velocity is None else velocity
-        absorbers, close = self.sides.absorbers(), AT_LEVEL * self.mesh.spacing
-        for _ in range(MOST_READINGS):
-            heights = [absorber.height for absorber in absorbers]
-            self._read_absorbing_sides()
-            for absorber in absorbers:
-                if abs(absorber.height) < close:
-                    absorber.height = absorber.speed = 0.0
-            surface = level.copy()
-            self.sides.surface(surface, 0.0)
-            self.level_set = self._surface_of(surface, given)
-            if all(abs(a.height - before) < close for a, before in zip(absorbers, heights)):
-                return
-
-    def _flux_at_start(self):
-        """The fluxes of the velocity of the cells at the start, which is that of all cells around the listed nodes."""
-        t, near = self.topology, np.zeros(len(self.velocity), bool)
-        near[self.listed] = True
-        around = t.cells_around(near)
-        now = CellVectors(around, self.cell_velocity.field(len(t.cells))[around])
-        self.cell_velocity = now
-        return FluxAhead(
-            nodes=self.listed,
-            graph=self.graph_for(self.listed),
-            now=now,
-            before=now.values,
-            dt=0.0,
-            water=self.nodal_water,
-            capacity=t.node_volume,
-        )
-
-    def _start_moving(self, velocity) -> None:
-        """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
-        self._start_speed = float(np.sqrt((velocity**2).sum(axis=1).max()))
-        self.velocity[self.listed] = velocity[self.listed]
-        self.hold(self.velocity, 0.0)
-        near = np.zeros(len(velocity), bool)
-        near[self.listed] = True
-        cells = self.topology.cells_around(near)
-        self.cell_velocity = CellVectors(cells, self.velocity[self.topology.cells[cells]].mean(axis=1))
+        self.flux = flux_at_start(self)
 
     def set_cell_velocity(self, velocity) -> None:
         """Velocity (M, 3) [m/s] of the cells before the first step, from which its fluxes are extrapolated."""
@@ -284,12 +229,12 @@ class Water:
         with another sign in every step, and so was the force on a body that slides through deep water."""
         t = self.topology
         fastest = self.fastest() if crossing is None or not t.is_uniform else crossing
-        factor = self._kick_factor(self.acceleration, t.node_size, fastest)
+        factor = self.kick_factor_of(self.acceleration, t.node_size, fastest)
         if self._domain_is_new:
             fill_missing(t, t.active & ~t.covered, factor[:, None])
         return factor
 
-    def _kick_factor(self, acceleration, size, fastest):
+    def kick_factor_of(self, acceleration, size, fastest):
         p = self.parameters
         return kick_factor(acceleration, p.kick_limit * p.gravity, 0.5 * fastest**2, size)
 
@@ -307,10 +252,10 @@ class Water:
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure. Nothing of the state changes but
         what absorbing sides have read."""
-        self._read_absorbing_sides()
+        self.read_absorbing_sides()
         return predicted(self, dt)
 
-    def _read_absorbing_sides(self) -> None:
+    def read_absorbing_sides(self) -> None:
         """Read depth and velocity beside the absorbing sides, which keep what they read, so that a restart has it."""
         for absorber in () if self.sides is None else self.sides.absorbers():
             from fluid.readings.gauges import levels, velocity
@@ -398,27 +343,11 @@ class Water:
             sides.absorbed = kept.pop("absorbed")
             vars(sides).update(kept)
 
-    # ---- moving solids
+    # ---- solids
 
     def move_solids(self, domain) -> None:
-        """Change to the present domain outside of the solids: every field is transferred, and values of newly wet nodes
-        are extrapolated from their neighbours.  The volume of water in the balance does not change; the next step
-        lifts the surface by what the solids displaced."""
-        old, old_topology = self.domain, self.topology
-        source = carry(old, domain)
-        self.set_domain(domain)
-        known = (source >= 0) & old_topology.active[source]
-        if self.left_behind is None:
-            self.left_behind = (self.velocity, self.acceleration, self.level_set, old_topology)
-        self._carry_nodes(source, known)
-        self._carry_cells(old, source)
-        self._find_band()
-        if not np.array_equal(source, np.arange(len(source))):
-            room = room_of_heirs(self.topology, self.level_set, source)
-            handed_on = renumbering(source, old.parent_node, domain.parent_node, room)
-            self.nodal_water = handed_on @ self.nodal_water
-            self.displaced = handed_on @ self.displaced
-            self.renumbered = handed_on if self.renumbered is None else handed_on @ self.renumbered
+        """Change to the present domain outside of the solids (`moved_solids.py`)."""
+        carry_to(domain, self)
 
     def set_cracks(self, cracks) -> None:
         """Lump the flow through these `slits.Cracks`; to be called after every change of the domain or of the
@@ -447,8 +376,8 @@ class Water:
             self.pressure = self._pressure_at_rest()
             self.end_pressure = self.pressure.copy()
             self.nodal_water = nodal_volume(self.topology, self.level_set)
-            self._find_band()
-            self.flux = self._flux_at_start()
+            self.find_band()
+            self.flux = flux_at_start(self)
         self.film_volume, self.film_potential = self.in_films(self.level_set)
         self.conserved_volume = float(self.nodal_water.sum()) - self.film_volume
         self.initial_volume = self.conserved_volume
@@ -468,57 +397,6 @@ class Water:
         from fluid.pressure.film_volume import film_volume
 
         return film_volume(self.domain, self.films.drawn_in, phi, self.nodes_below_floor)
-
-    def carried(self, dt: float, theta: float, kick) -> Carried:
-        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; kick
-        (N,): `kick_factor`."""
-        carried = self._carried(dt, theta, kick)
-        if self.given_by_films.any():
-            carried = replace(carried, water=carried.water + dt * self.given_by_films)
-        carried = carried if self.renumbered is None else carried.handed_on(self.renumbered)
-        if self.slits is None:
-            return carried
-        return replace(carried, water=carried.water + self.slits.carried(dt))
-
-    def _carried(self, dt: float, theta: float, kick) -> Carried:
-        u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
-        p, flux = self.parameters, self.flux.over(t, dt)
-        if self.left_behind is not None:
-            kick = self._kick_factor(a, t.node_size, self.fastest())
-        u_hat, u_m = kicked(u, a, kick, dt, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
-        found, moved = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size)
-        if p.advection == "supg":
-            found = found.near_the_surface()
-        if t.is_obtuse:
-            return replace(found, swept=np.zeros(len(phi)))
-        return replace(found, swept=swept(t, flux, phi, u_m, moved, dt))
-
-    def _carry_nodes(self, source, known):
-        scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
-        fields = [scalars, self.velocity, self.acceleration]
-        moved = [np.ascontiguousarray(f[source]) for f in fields]
-        fill_missing(self.topology, known, *moved)
-        self.level_set = self._dry_if_inactive(moved[0][:, 0])
-        self.pressure, self.end_pressure = moved[0][:, 1].copy(), moved[0][:, 2].copy()
-        self.velocity, self.acceleration = moved[1], moved[2]
-        self.at_bound, self.ventilated = known & self.at_bound[source], known & self.ventilated[source]
-        if self.air is not None:
-            self.air = self.air.carried(source, known)
-            self.moved_by_end = np.zeros_like(self.moved_by_end)
-        self.hold(self.velocity, self.time)
-
-    def _carry_cells(self, old, source):
-        """Cell fields go on in the cells that continue the old ones; source (N,): old node of each node."""
-        if old.covers == "single" and np.array_equal(old.parent_cell, self.domain.parent_cell):
-            return
-        cells = pick_old_cells(old, self.domain, source)
-        if np.array_equal(cells, np.arange(len(old.cells))):
-            return
-        for name in ("cell_velocity", "remainder", "kick_remainder"):
-            setattr(self, name, getattr(self, name).carried(cells, len(old.cells)))
-        fresh = np.flatnonzero(cells < 0)
-        of_nodes = self.velocity[self.topology.cells[fresh]].mean(axis=1)
-        self.cell_velocity = self.cell_velocity.joined(fresh, of_nodes)
 
     # ---- layout
 
@@ -548,7 +426,7 @@ class Water:
         self._domain_is_new = True
         self.graph = None
 
-    def _find_band(self) -> None:
+    def find_band(self) -> None:
         """The nodes that the step works on: the water and the layers around it."""
         self.listed, self.layer_start = self.layers((self.level_set < 0.0) & self.topology.active)
 
@@ -579,7 +457,7 @@ class Water:
         top = below[wet].min() if wet.any() else 0.0
         return np.where(wet, self.parameters.density * (below - top), 0.0)
 
-    def _dry_if_inactive(self, level):
+    def dry_if_inactive(self, level):
         return np.where(self.topology.active, level, FAR * self.topology.node_size)
 
     # ---- sides of the tank

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fluid.step.carried import carried_by_fluxes
 from fluid.surface.volume import Shift
 from fluid.transport import surface_momentum
 from fluid.transport.volume_transport import carry_volume
@@ -35,13 +36,13 @@ def test_momentum_counts_at_jumps_and_in_fast_water_only():
         while water.time < 0.25:
             advance(water)
     dt = wave.stable_step()
-    assert wave.carried(dt, 0.6, wave.kick_factor()).weight is None
-    front = dry.carried(dt, 0.6, dry.kick_factor())
+    assert carried_by_fluxes(wave, dt, 0.6, wave.kick_factor()).weight is None
+    front = carried_by_fluxes(dry, dt, 0.6, dry.kick_factor())
     assert front.weight.max() == 0.0
     assert front.fast.max() > 0.5
     slow = np.linalg.norm(dry.velocity, axis=1) < np.sqrt(9.81 * 0.125)
     assert front.fast[slow].max() == 0.0
-    assert bore.carried(dt, 0.6, bore.kick_factor()).weight.max() > 0.5
+    assert carried_by_fluxes(bore, dt, 0.6, bore.kick_factor()).weight.max() > 0.5
 
 
 def test_a_thick_liquid_keeps_its_own_viscosity_however_fast_it_is():
@@ -107,7 +108,7 @@ def test_what_the_correction_moves_takes_its_momentum_along_even_past_a_node_wit
     water = tank([2, 0.125, 1.0], 0.125, lambda x: np.minimum(column(0.8, 0.8)(x), x[:, 2] - 0.25))
     while water.time < 0.25:
         advance(water)
-    found = water.carried(water.stable_step(), 0.6, water.kick_factor())
+    found = carried_by_fluxes(water, water.stable_step(), 0.6, water.kick_factor())
     t, u, holds = water.topology, found.velocity.copy(), found.water > 0.0
     band = np.flatnonzero(holds & t.active)
     front, behind = band[np.argmax(u[band, 0])], band[np.argmin(u[band, 0])]

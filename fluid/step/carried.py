@@ -1,0 +1,41 @@
+"""What the fluxes of a step carry: volume and momentum at the nodes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fluid.step.kick import kicked
+from fluid.transport.surface_momentum import Carried
+from fluid.transport.swept_volume import swept
+
+if TYPE_CHECKING:
+    from fluid.step.water import Water
+
+
+def carried_by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
+    """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; kick
+    (N,): `kick_factor`."""
+    found = _by_fluxes(water, dt, theta, kick)
+    if water.given_by_films.any():
+        found = replace(found, water=found.water + dt * water.given_by_films)
+    found = found if water.renumbered is None else found.handed_on(water.renumbered)
+    if water.slits is None:
+        return found
+    return replace(found, water=found.water + water.slits.carried(dt))
+
+
+def _by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
+    u, a, phi, t = water.left_behind or (water.velocity, water.acceleration, water.level_set, water.topology)
+    p, flux = water.parameters, water.flux.over(t, dt)
+    if water.left_behind is not None:
+        kick = water.kick_factor_of(a, t.node_size, water.fastest())
+    u_hat, u_m = kicked(u, a, kick, dt, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
+    found, moved = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size)
+    if p.advection == "supg":
+        found = found.near_the_surface()
+    if t.is_obtuse:
+        return replace(found, swept=np.zeros(len(phi)))
+    return replace(found, swept=swept(t, flux, phi, u_m, moved, dt))
