@@ -21,9 +21,9 @@ JUNK = ["[]", "{}", "null", "1", '"x"', "", "\0", "{", '{"status": 1}', "[" * 10
 
 
 def refusals(run):
-    """What resume, explain, report and render say of a run that none of them can use."""
+    """What resume, explain and report say of a run that none of them can use."""
     reported = []
-    for use in (prepare, explanation_of_run, lambda run: report(run, False), summary_for_pictures):
+    for use in (prepare, explanation_of_run, lambda run: report(run, False)):
         with pytest.raises(SurgebreakError) as refusal:
             use(run)
         assert refusal.value.exit_code == ExitCode.BAD_CASE
@@ -35,6 +35,16 @@ def refusals(run):
 def test_a_summary_that_no_run_wrote(copy, content):
     (copy / "run.json").write_text(content, encoding="utf-8")
     assert all("run.json" in reported for reported in refusals(copy))
+
+
+@pytest.mark.parametrize("content", JUNK, ids=range(len(JUNK)))
+def test_pictures_need_little_of_a_summary_but_no_torn_one(copy, content):
+    (copy / "run.json").write_text(content, encoding="utf-8")
+    if content.endswith("}"):
+        assert isinstance(summary_for_pictures(copy), dict)
+    else:
+        with pytest.raises(NoRun, match=r"run\.json: "):
+            summary_for_pictures(copy)
 
 
 @pytest.mark.parametrize(

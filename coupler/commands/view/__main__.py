@@ -2,16 +2,17 @@
 
 import argparse
 import ctypes
+import json
 import os
 import sys
 import time
 from pathlib import Path
 
+from coupler.case.paths import BadPath, read_text
 from coupler.commands.view.camera import VIEWS
-from coupler.program.errors import FULL, ExitCode, SurgebreakError
+from coupler.program.errors import FULL, ExitCode, NoRun, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import was_killed
-from coupler.run.summary import FILE_NAME, read_summary
 
 INSIDE = "inside"
 
@@ -185,8 +186,17 @@ def make(options):
 
 
 def summary(run):
-    """What run.json says; nothing where there is none.  Raises NoRun where no run wrote it."""
-    return read_summary(run) if (run / FILE_NAME).exists() else {}
+    """What run.json says, which may be incomplete; nothing where there is none.  Raises NoRun where it is torn."""
+    path = run / "run.json"
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(read_text(path))
+    except (ValueError, RecursionError, BadPath) as error:
+        raise NoRun(f"{path}: {error}") from error
+    if not isinstance(found, dict):
+        raise NoRun(f"{path}: not what a run writes")
+    return found
 
 
 def report(action, *given, **options):
