@@ -77,7 +77,7 @@ def test_north_turns_with_the_terrain(tmp_path):
     (tmp_path / "run.json").write_text('{"case": {"terrain": {"turn": 1.5707963267948966}}}')
     code = (
         "from types import SimpleNamespace as S; from pathlib import Path;"
-        "from coupler.commands.view.scene import north_of;"
+        "from coupler.commands.view.captions import north_of;"
         f"print(*north_of(S(directory=Path({str(tmp_path)!r}))), north_of(S(directory=Path('/nowhere'))))"
     )
     x, y, without = told(code).split()

@@ -1,13 +1,10 @@
 """The picture of one instant: water as a volume coloured by speed, blocks by damage, solids grey, on white paper."""
 
-import json
 import os
 from pathlib import Path
 
 # Must stand before VTK opens a window: without a display its X window only warns and falls back to EGL.
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-
-import textwrap
 
 import matplotlib
 import numpy as np
@@ -16,15 +13,16 @@ from matplotlib.colors import ListedColormap
 
 from coupler.commands.view import palette
 from coupler.commands.view.camera import frame, side_of
+from coupler.commands.view.captions import caption_of, north_of, where_it_happens
 from coupler.commands.view.foam import foam
+from coupler.commands.view.scales import bounds, corners, decimals, fastest_and_air, nice_floor
 from coupler.commands.view.section import (
     closed_behind_cut,
     ground_behind_cut,
     solid_behind_cut,
     with_section,
 )
-from coupler.commands.view.water_surface import facing, shading_normals, skin, some, surfaces_of_pockets
-from coupler.program.quantities import counted
+from coupler.commands.view.water_surface import facing, shading_normals, skin, surfaces_of_pockets
 
 WATER_OPACITY = 0.78
 SUN = np.array([-0.45, -0.75, 1.1])  # from the scene to the light, for a camera at azimuth -90 degree
@@ -32,7 +30,6 @@ HEADLIGHT, LAMP = 0.3, 0.75  # from the camera, outside and where the sun does n
 FILL = np.array([1.0, -0.2, 0.25])
 LETTERS = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 VTK_FONT_FILE = 4  # vtkTextProperty: use the font file
-SAMPLED_STEPS = 25
 SEEN_THROUGH = 0.55
 """Opacity of blocks in a run with trapped air, which is behind them."""
 MOST_POCKETS = 6
@@ -335,26 +332,6 @@ CAPTION_LETTERS = 31
 """Letters in a line of the caption per width of one picture height, so that the caption ends beside the time."""
 
 
-def caption_of(run, width):
-    """Title of the case, then number of cells and blocks, in lines of at most width letters, broken between words."""
-    counts = []
-    if run.water:
-        counts.append(counted(len(run.water.at(run.water.times[0]).cells), "cell"))
-    if run.blocks:
-        counts.append(counted(int(run.blocks.at(run.blocks.times[0])["block"].max()) + 1, "block"))
-    title = _entry(run, "case", "case", "title") or run.directory.name
-    return "\n".join([*textwrap.wrap(title, max(width, 1)), *([", ".join(counts)] if counts else [])])
-
-
-def north_of(run):
-    """Direction (2,) of north in plan: y of the terrain file, which may be rotated; None without a terrain."""
-    terrain = _entry(run, "case", "terrain")
-    if not isinstance(terrain, dict):
-        return None
-    turn = float(terrain.get("turn") or 0.0)
-    return np.array([-np.sin(turn), np.cos(turn)])
-
-
 def camera_inside(run, azimuth):
     """The camera among the blocks in their initial places; without an azimuth it looks towards where damage begins."""
     from coupler.commands.view.inside import NoInside, inside
@@ -383,35 +360,6 @@ def cut_of(cut, azimuth):
     towards = [np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 1.0][axis]
     normal[axis] = 1.0 if towards >= 0.0 else -1.0
     return normal, origin
-
-
-def where_it_happens(run):
-    """Direction (2,) in plan from the middle of the blocks to the first joint that broke, else to the water at
-    the start; zero without blocks."""
-    if not run.blocks:
-        return np.zeros(2)
-    low, high = corners(run.blocks.at(run.blocks.times[0]))
-    middle = 0.5 * (low + high)[:2]
-    place = _entry(run, "figures", "verdict", "first_break", "place")
-    if place:
-        return np.array(place[:2], float) - middle
-    if not run.water:
-        return np.zeros(2)
-    water = run.water.at(run.water.times[0])
-    wet = water.nodes[water.level_set < 0.0]
-    return wet[:, :2].mean(axis=0) - middle if len(wet) else np.zeros(2)
-
-
-def _entry(run, *names):
-    """The value in run.json under these nested names; None where it is missing, as in an incomplete file."""
-    path = run.directory / "run.json"
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    for name in names:
-        found = found.get(name) if isinstance(found, dict) else None
-    return found
 
 
 def water_surface(water, eye, tank=None, foam_over=None):
@@ -449,72 +397,10 @@ def ground(lower, upper, room_for_shadows):
     return pv.PolyData([[x[0], y[0], z], [x[1], y[0], z], [x[1], y[1], z], [x[0], y[1], z]], [4, 0, 1, 2, 3])
 
 
-def bounds(run):
-    """Corners (lower, upper) (3,) [m] of what the pictures show: the tank, or else all the places of the blocks."""
-    boxes = []
-    if run.tank is not None:
-        boxes.append(np.asarray(run.tank, dtype=float))
-    elif run.water:
-        nodes = run.water.at(run.water.times[0]).nodes
-        boxes.append((nodes.min(axis=0), nodes.max(axis=0)))
-    if run.solids is not None:
-        boxes.append(corners(run.solids))
-    if run.blocks and not boxes:
-        boxes += [corners(run.blocks.at(time)) for time in sampled(run.blocks.times)]
-    elif run.blocks:
-        boxes.append(corners(run.blocks.at(run.blocks.times[0])))
-    lower, upper = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
-    return lower, np.maximum(upper, lower + 1e-3 * np.max(upper - lower))
-
-
-def corners(mesh):
-    """Lower and upper corner (2, 3) of a data set."""
-    return np.reshape(mesh.bounds, (3, 2)).T
-
-
-def sampled(times):
-    """At most SAMPLED_STEPS of the times, first and last among them."""
-    return times[np.unique(np.linspace(0, len(times) - 1, SAMPLED_STEPS).astype(int))]
-
-
-def fastest_and_air(run):
-    """Round speed [m/s] below which 98 % of the nodes at the surface stay over the run, and whether air is trapped in
-    it. Nodes inside are not visible, and spray should not set the colour scale."""
-    speeds, air = [np.zeros(1)], False
-    for time in sampled(run.water.times):
-        water = run.water.at(time)
-        air = air or bool(water.pocket.any())
-        wet = (water.level_set < 0)[water.cells]
-        seen = np.zeros(len(water.nodes), bool)
-        seen[water.cells[some(wet) & some(~wet)]] = True
-        speeds.append(np.linalg.norm(water.velocity[seen & (water.level_set < 0)], axis=1))
-    return nice_ceiling(float(np.percentile(np.concatenate(speeds), 98))), air
-
-
-def nice_ceiling(value):
-    """The next larger round number, so that little of a colour scale is left unused (1 where nothing moves)."""
-    if value <= 0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(r * power for r in (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12) if r * power >= value))
-
-
-def nice_floor(value):
-    """The last of 1, 2, 5, 10, … times a power of ten that is not larger."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(r * power for r in (5, 2, 1) if r * power <= value * (1 + 1e-12)))
-
-
 def behind(mapper):
     """Draw a surface behind others that coincide with it, such as a block in the plane of a wall of the water."""
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(1.0, 8.0)
-
-
-def decimals(times):
-    """Digits after the point that tell neighbouring times apart, at least two."""
-    apart = np.diff(np.unique(times))
-    return 2 if len(apart) == 0 else int(np.clip(np.ceil(-np.log10(apart.min() * 1.001)), 2, 6))
 
 
 def turned(vector, angle):

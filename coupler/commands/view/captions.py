@@ -1,0 +1,58 @@
+"""What the files of a run say about a picture: its caption, where north is, and where the damage began."""
+
+import json
+import textwrap
+
+import numpy as np
+
+from coupler.commands.view.scales import corners
+from coupler.program.quantities import counted
+
+
+def caption_of(run, width):
+    """Title of the case, then number of cells and blocks, in lines of at most width letters, broken between words."""
+    counts = []
+    if run.water:
+        counts.append(counted(len(run.water.at(run.water.times[0]).cells), "cell"))
+    if run.blocks:
+        counts.append(counted(int(run.blocks.at(run.blocks.times[0])["block"].max()) + 1, "block"))
+    title = _entry(run, "case", "case", "title") or run.directory.name
+    return "\n".join([*textwrap.wrap(title, max(width, 1)), *([", ".join(counts)] if counts else [])])
+
+
+def north_of(run):
+    """Direction (2,) of north in plan: y of the terrain file, which may be rotated; None without a terrain."""
+    terrain = _entry(run, "case", "terrain")
+    if not isinstance(terrain, dict):
+        return None
+    turn = float(terrain.get("turn") or 0.0)
+    return np.array([-np.sin(turn), np.cos(turn)])
+
+
+def where_it_happens(run):
+    """Direction (2,) in plan from the middle of the blocks to the first joint that broke, else to the water at
+    the start; zero without blocks."""
+    if not run.blocks:
+        return np.zeros(2)
+    low, high = corners(run.blocks.at(run.blocks.times[0]))
+    middle = 0.5 * (low + high)[:2]
+    place = _entry(run, "figures", "verdict", "first_break", "place")
+    if place:
+        return np.array(place[:2], float) - middle
+    if not run.water:
+        return np.zeros(2)
+    water = run.water.at(run.water.times[0])
+    wet = water.nodes[water.level_set < 0.0]
+    return wet[:, :2].mean(axis=0) - middle if len(wet) else np.zeros(2)
+
+
+def _entry(run, *names):
+    """The value in run.json under these nested names; None where it is missing, as in an incomplete file."""
+    path = run.directory / "run.json"
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    for name in names:
+        found = found.get(name) if isinstance(found, dict) else None
+    return found
