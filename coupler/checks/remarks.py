@@ -9,6 +9,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.materials import material_remarks
 from coupler.checks.arrivals import arrival_remarks
+from coupler.checks.gaps import gap_remarks
 from coupler.checks.gauges import gauge_remarks
 from coupler.checks.sides import side_remarks
 from coupler.checks.softness import softness_remarks
@@ -28,6 +29,7 @@ def remarks(case: Case) -> list[str]:
     """Remarks on what is allowed but should be known before the run."""
     found = [
         *thin_remarks(case),
+        *gap_remarks(case),
         *_contact_remarks(case),
         *_pass_remarks(case),
         *softness_remarks(case),
