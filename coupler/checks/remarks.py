@@ -11,6 +11,7 @@ from coupler.case.materials import material_remarks
 from coupler.checks.arrivals import arrival_remarks
 from coupler.checks.gaps import gap_remarks
 from coupler.checks.gauges import gauge_remarks
+from coupler.checks.insides import inside_remarks
 from coupler.checks.sides import side_remarks
 from coupler.checks.softness import softness_remarks
 from coupler.checks.supports import support_remarks
@@ -30,6 +31,7 @@ def remarks(case: Case) -> list[str]:
     found = [
         *thin_remarks(case),
         *gap_remarks(case),
+        *inside_remarks(case),
         *_contact_remarks(case),
         *_pass_remarks(case),
         *softness_remarks(case),
