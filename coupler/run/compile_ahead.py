@@ -32,17 +32,18 @@ ENOUGH = 0.5
 
 
 def compile_ahead(case: Case, tell: Callable[[str], object]) -> None:
-    """Compile the kernels that the case needs and the cache lacks, if there is more than one core. Failures are left to
-    the run."""
+    """Compile the kernels that the case needs and the cache lacks, if there is more than one core; otherwise say that
+    the run will. Failures are left to the run, too."""
     cores = len(os.sched_getaffinity(0))
     wanted = [part for part in needed(case) if not is_compiled(part)]
     chains = [own for chain in CHAINS if (own := [part for part in chain if part in wanted])]
-    if cores < 2 or len(chains) < 2:
+    if not wanted:
         return
-    tell(
-        f"compiling the numerical kernels ({', '.join(wanted)}), once for this version of the program: "
-        f"{len(chains)} processes on {cores} cores, a minute or more"
-    )
+    what = f"compiling the numerical kernels ({', '.join(wanted)}), once for this version of the program"
+    if cores < 2 or len(chains) < 2:
+        tell(f"{what}, as they are first called: half a minute or more")
+        return
+    tell(f"{what}: {len(chains)} processes on {cores} cores, a minute or more")
     began, before = time.monotonic(), _children_seconds()
     failed = _compile(chains)
     if failed:
