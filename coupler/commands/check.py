@@ -36,6 +36,7 @@ def check(
     take_laws(law)
     from coupler.checks.read_case import load
     from coupler.program import terminal
+    from coupler.run.compile_ahead import is_compiled
     from coupler.run.execute import describe
     from coupler.run.forecast import forecast
 
@@ -50,4 +51,9 @@ def check(
         print(f"picture: {picture}")
     if file.case.structure is not None and len(file.case.solid) >= MANY_SOLIDS:
         print(f"the substep, with {len(file.case.solid)} fixed solids that blocks can touch, ...", flush=True)
+    if file.case.structure is not None and file.case.joints is not None and not is_compiled("structure"):
+        print(
+            "compiling the kernels of joints for the substep, once for this version: half a minute or more",
+            flush=True,
+        )
     terminal.table("forecast", forecast(file.case, exact, file.directory).rows)

@@ -2,14 +2,18 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
+from typer.testing import CliRunner
 
 from coupler.case.case import modules
 from coupler.checks.read_case import from_text, load
+from coupler.commands.cli import app
 from coupler.commands.warm_up import CASE, PARTS
 from coupler.program.process import environment
 from coupler.run import compile_ahead as ahead
+from coupler.run import forecast
 
 
 def test_the_warm_up_case_switches_on_both_sides_and_what_joins_them(tmp_path):
@@ -58,6 +62,15 @@ def test_where_nothing_is_gained_the_run_compiles_as_it_goes(reported):
         assert asked == []
         assert lines.startswith("compiling the numerical kernels (")
         assert lines.endswith("as they are first called: half a minute or more")
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_check_says_why_nothing_is_heard_of_it_for_a_while(tmp_path, monkeypatch, there):
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    monkeypatch.setattr(ahead, "is_compiled", lambda part: there)
+    monkeypatch.setattr(forecast, "forecast", lambda *given: SimpleNamespace(rows=[]))
+    told = CliRunner().invoke(app, ["check", str(tmp_path)]).output
+    assert ("compiling the kernels of joints" in told) != there
 
 
 def test_a_failure_is_reported_and_left_to_the_run(reported):
