@@ -4,7 +4,7 @@ u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)              
 p = x + known, mean over the step, acts on the bodies;  x/θ belongs to a_i and starts the next step
 u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on deep cells, see `remainders.py`
 u_e = u*_e + u'_e - (dt/ρ) ∇x_e                                               balances exactly: carries volume
-speed limit · divergence damping · continuation outside the water
+speed limit · divergence damping · continuation outside the water, whose momentum the water bears
 """
 
 from __future__ import annotations
@@ -31,9 +31,11 @@ from fluid.pressure.projection import (
 from fluid.step.momentum import Stages, holding_water, momentum_change
 from fluid.step.remainders import LAYER, MEMORY_DEPTH, left_in_cells
 from fluid.step.report import StepReport
+from fluid.surface.borne_momentum import Borne
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import FluxAhead
+from fluid.transport.surface_momentum import by_speed
 from kernels.decorators import ranged
 from kernels.threads import CHUNK, over, summed, zeros
 
@@ -101,7 +103,7 @@ def corrected(water, problem, x, parting) -> Corrected:
     clipped, limited, damped = _limit_and_damp(water, kept, u, a, held, projected, calm)
     slipping = copied_at(held, u)
     listed, start = water.layers(kept.wet)
-    _continue(water, kept, listed, start, u, a, forced, calm)
+    _continue(water, kept, listed, start, u, a, forced, dt, calm)
     cell_field, flux = _flux(water, kept, listed, start, u, gradient, dt)
     momentum = momentum_change(
         water,
@@ -249,17 +251,35 @@ def _clip(first, last, u, a, limit, weight):
     return count
 
 
-def _continue(water, kept, listed, start, u, a, forced, calm) -> None:
+def _continue(water, kept, listed, start, u, a, forced, dt, calm) -> None:
     """Velocity and acceleration outside the water, in place; limited again, slipping again.
 
-    forced: see `extend_velocity` · calm: `Water.calm`"""
+    forced: see `extend_velocity` · dt [s]: of the step · calm: `Water.calm`"""
     rubbed = water.nodes_at_rough_walls()
     t = water.topology
     extend_velocity(t, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
+    outside = listed[start[1] : start[2]]
+    p = water.parameters
+    fast, some = by_speed(outside, forced, p.gravity, p.viscosity / p.density, t.node_size)
+    if some:
+        borne = Borne(t, outside, kept.wet, kept.nodal_water, fast, kept.in_jumps)
+        borne.give(forced, u)
+        own = np.empty(a.shape)
+        over(_own_acceleration, len(outside), outside, forced, kept.advected, kept.theta * dt, own)
+        borne.give(own, a)
     if kept.in_jumps is not None:
         over(_keep_momentum, len(u), kept.in_jumps, kept.wet, kept.nodal_water, t.node_volume, forced, u)
     _limit_speed(water, u, a)
     water.hold(u, kept.end, kept.wet)
+
+
+@ranged
+def _own_acceleration(first, last, nodes, forced, advected, time, own):
+    """What the forces alone change in a `time` [s], (N, 3) [m/s²], at the listed nodes."""
+    for s in range(first, last):
+        i = nodes[s]
+        for k in range(3):
+            own[i, k] = (forced[i, k] - advected[i, k]) / time
 
 
 @ranged

@@ -6,6 +6,7 @@ volume                        the conservative volume, its fluxes, and the level
 pools                         water that is connected
 cavities                      air on walls that the water has left
 extrapolation                 values continued from the water into the nodes around it
+borne_momentum                momentum of the water at nodes above the surface
 gradient_jump_damping         velocity of single nodes along a calm surface on meshes with obtuse cells
 
 Imports `domain` and the chapters below it.

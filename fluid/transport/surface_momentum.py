@@ -100,14 +100,14 @@ class Carried:
         [m]: size of the cells."""
         edges = flux.graph.edges
         n, size = len(flux.nodes), len(velocity)
-        weight, fast = zeros((size,)), zeros((size,))
+        weight = zeros((size,))
         state = (flux.rate, flux.water, flux.capacity, velocity, acceleration, gravity, spacing)
         jumps = sum(over(_jumps, n, flux.nodes, edges, *state, weight))
         if jumps:
             for _ in range(RINGS):
                 before, weight = weight, copied(weight)
                 over(_wider, n, flux.nodes, edges, before, weight)
-        n_fast = sum(over(_by_speed, n, flux.nodes, velocity, gravity, viscosity, spacing, fast))
+        fast, n_fast = by_speed(flux.nodes, velocity, gravity, viscosity, spacing)
         if not jumps and not n_fast:
             volume, moved = carry_volume(flux, dt)
             return cls(volume), moved
@@ -146,6 +146,15 @@ class Carried:
         state = ((self.water, t.node_volume), (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
         return jumps
+
+
+def by_speed(nodes, velocity, gravity: float, viscosity: float, spacing) -> tuple[Array, int]:
+    """w (N,) in fast water at the listed nodes, zero elsewhere, and at how many it is not zero.
+
+    velocity (N, 3) [m/s] · gravity [m/s²] · viscosity: kinematic [m²/s] · spacing (N,) [m]: size of the cells"""
+    weight = zeros((len(velocity),))
+    some = sum(over(_by_speed, len(nodes), nodes, velocity, gravity, viscosity, spacing, weight))
+    return weight, some
 
 
 @ranged
