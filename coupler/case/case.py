@@ -28,7 +28,7 @@ from coupler.case.types import (
 )
 from coupler.case.units import InSI
 from coupler.case.verdict import Verdict
-from coupler.case.water import Solid, Water
+from coupler.case.water import File, Solid, Water
 
 
 class About(Section):
@@ -362,10 +362,28 @@ class Joints(Section):
 
 
 class Motion(Section):
-    """A block that moves as prescribed, for instance the grip of a testing machine."""
+    """A block that moves as prescribed, without turning: the grip of a testing machine, a gate, a wave maker, a shaking
+    table. It has one velocity for the whole run (velocity), or one over time, given here (times and velocities) or in a
+    file (path), linear in between; its place follows from it."""
 
     block: Name = Field(description="name of the block")
-    velocity: VelocityVector = Field(description="its velocity for the whole run")
+    velocity: VelocityVector | None = Field(None, description="its velocity for the whole run")
+    times: tuple[Annotated[float, InSI("s", ge=0)], ...] = Field(
+        (),
+        description="instead: times of velocities, increasing, the first 0; after the last its velocity goes on",
+        examples=[["0 s", "0.5 s", "1 s"]],
+    )
+    velocities: tuple[VelocityVector, ...] = Field(
+        (),
+        description="velocity at each of these times, linear in between",
+        examples=[[[0, 0, 0], ["0.2 m/s", 0, 0], [0, 0, 0]]],
+    )
+    path: File | None = Field(
+        None,
+        description="instead: CSV with the columns time [s] and velocity_x, velocity_y, velocity_z [m/s], at least one "
+        "of them (the others are zero), from the directory of the case",
+        examples=["paddle.csv"],
+    )
 
 
 class Coupling(Section):

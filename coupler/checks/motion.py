@@ -9,24 +9,31 @@ from coupler.case.case import Case
 from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath, Problem
 from coupler.geometry.bodies import Body
+from coupler.geometry.motions import MotionError, motion_of
 from coupler.geometry.parts import Part, recipes
 
 THROUGH = 1e-3
 """Share of its thickness by which a driven block may enter a wall: what rounding of speeds and times leaves."""
+HALVINGS = 40
+"""Halvings of the time until a motion reaches a wall."""
 
 
 def motion_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
-    """Blocks that are told two motions, and driven blocks that pass through a closed side of the tank, or through the
-    ground, before the end."""
+    """Motions that cannot be followed, blocks that are told two, and driven blocks that pass through a closed side of
+    the tank, or through the ground, before the end."""
     yield from _held_with_a_start(case)
     yield from _driven_twice(case)
     yield from _driven_and_held(case, parts)
     blocks = {block.name: block for part in parts for block in part.blocks}
     walls = list(_walls(case))
     for i, motion in enumerate(case.motion):
+        try:
+            motion_of(motion)
+        except MotionError as error:
+            yield ("motion", i, error.key), str(error)
+            continue
         if motion.block in blocks:
-            body = Body.of_block(blocks[motion.block])
-            yield from _passed(case, ("motion", i, "velocity"), motion, body, walls)
+            yield from _passed(case, ("motion", i, _key(motion)), blocks[motion.block], walls)
 
 
 def _held_with_a_start(case: Case) -> Iterator[Problem]:
@@ -56,7 +63,7 @@ def _driven_twice(case: Case) -> Iterator[Problem]:
             )
         elif given:
             yield (
-                ("motion", i, "velocity"),
+                ("motion", i, _key(motion)),
                 f"'{motion.block}' has a {given} at the start as well (structure.block[{row}].{given}), but it moves "
                 "with the velocity of this motion from the start on, without turning; leave one of them out",
             )
@@ -88,18 +95,44 @@ def _start(block) -> str:
     return next((key for key in ("velocity", "spin") if any(getattr(block, key))), "")
 
 
-def _passed(case: Case, path: KeyPath, motion, body: Body, walls) -> Iterator[Problem]:
+def _key(motion) -> str:
+    """The key by which a motion is given."""
+    return next(
+        key for key in ("velocity", "times", "path", "block") if getattr(motion, key) not in (None, ())
+    )
+
+
+def _passed(case: Case, path: KeyPath, block, walls) -> Iterator[Problem]:
+    """block: driven, with its motion."""
+    body, motion = Body.of_block(block), block.motion
     low, high = body.bounds()
     for what, axis, sign, place in walls:
-        speed = sign * motion.velocity[axis]
+        speed = sign * block.velocity[axis]
         room = sign * (place - (high if sign > 0.0 else low)[axis])
-        if speed > 0.0 and speed * case.time.end > room + THROUGH * body.thickness():
+        allowed = room + THROUGH * body.thickness()
+        if motion is None:
+            reached = max(0.0, room) / speed if speed > 0.0 and speed * case.time.end > allowed else None
+        else:
+            turns = motion.turning_times(axis, case.time.end)
+            beyond = [t for t in turns.tolist() if sign * motion.way(t)[axis] > allowed]
+            reached = _reached(motion, axis, sign, max(0.0, room), beyond[0]) if beyond else None
+        if reached is not None:
             yield (
                 path,
-                f"'{motion.block}' reaches {what} ({'xyz'[axis]} = {place:g} m) at t = {max(0.0, room) / speed:.4g} s "
+                f"'{block.name}' reaches {what} ({'xyz'[axis]} = {place:g} m) at t = {reached:.4g} s "
                 f"and would pass through it until the end ({case.time.end:g} s): nothing stops a prescribed motion; "
                 "end the run before, or change the velocity or the place",
             )
+
+
+def _reached(motion, axis: int, sign: float, room: float, beyond: float) -> float:
+    """Time [s] at which a motion has gone as far as `room` [m], before the time `beyond` at which it is farther."""
+    before = 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (before + beyond)
+        farther = sign * motion.way(middle)[axis] > room
+        before, beyond = (before, middle) if farther else (middle, beyond)
+    return beyond
 
 
 def _walls(case: Case) -> Iterator[tuple[str, int, float, float]]:

@@ -149,7 +149,13 @@ def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
 def _named_files(table: dict) -> Iterator[tuple[KeyPath, dict]]:
     """The tables of a case that may name a file under `path`, with their places."""
     of_structure = (("structure", name) for name in ("file", "drawing", "town"))
-    for above, name in (*of_structure, ("water", "inflow"), ("study", "quantity"), (None, "solid")):
+    for above, name in (
+        *of_structure,
+        ("water", "inflow"),
+        ("study", "quantity"),
+        (None, "solid"),
+        (None, "motion"),
+    ):
         section = table if above is None else table.get(above)
         entries = section.get(name) if isinstance(section, dict) else None
         for i, entry in enumerate(entries if isinstance(entries, list) else ()):

@@ -7,6 +7,7 @@ basin                             a basin from a mesh file as blocks meet it
 terrain                           the ground of a site, from files
 start_surfaces                    surfaces of the water at the start that are not level
 parts, block_files, drawing       blocks of the structure, one by one, from generators, from files, from a drawing
+motions                           motions over time that blocks are told, from tables and files
 town, footprints, outlines        buildings of a town, from a file of their footprints
 solids, closed_surfaces           fixed solids as convex bodies
 solid_ground                      how high solids raise the bed

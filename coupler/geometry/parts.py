@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from coupler.case.case import Case
 from coupler.case.paths import stamp
 from coupler.case.types import KeyPath
 from coupler.geometry.bodies import turned
+from coupler.geometry.motions import MotionError, motion_of
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,10 @@ def parts_of(case: Case) -> tuple[Part, ...]:
     Kept for the next call: a case is checked, forecast and built from the same blocks, unless a file changed.
     """
     files = (*case.structure.file, *case.structure.drawing, *case.structure.town) if case.structure else ()
+    files = (
+        *files,
+        *(motion for motion in case.motion if motion.path is not None and Path(motion.path).is_file()),
+    )
     stamps = tuple(stamp(spec.path) for spec in files)
     return _made(case, stamps)
 
@@ -52,7 +58,7 @@ def recipes(case: Case) -> Iterator[Recipe]:
     """Recipes of all parts of the structure."""
     if case.structure is None:
         return
-    driven = {motion.block: motion.velocity for motion in case.motion}
+    driven = {motion.block: _told(motion) for motion in case.motion}
     for kind, make in _MAKERS.items():
         for i, spec in enumerate(getattr(case.structure, kind)):
             yield Recipe(
@@ -96,10 +102,18 @@ def _made_from(case: Case, spec, make, driven: dict) -> list:
     blocks = make(spec, common)
     if getattr(spec, "turn", 0.0):
         blocks = turned_about(blocks, np.array(spec.lower) + 0.5 * np.array(spec.size), spec.turn)
-    return [
-        b.changed(driven=True, fixed=False, velocity=np.array(driven[b.name])) if b.name in driven else b
-        for b in blocks
-    ]
+    return [b.changed(driven=True, fixed=False, **driven[b.name]) if b.name in driven else b for b in blocks]
+
+
+def _told(spec) -> dict:
+    """What a table [[motion]] changes of its block: the velocity, at the start where it varies, and the motion."""
+    try:
+        motion = motion_of(spec)
+    except MotionError:  # reported with its reason by the checks, before anything is built
+        return {"velocity": np.zeros(3)}
+    if motion is None:
+        return {"velocity": np.array(spec.velocity)}
+    return {"velocity": motion.velocities[0], "motion": motion}
 
 
 def turned_about(blocks: list, middle, angle: float) -> list:

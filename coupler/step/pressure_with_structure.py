@@ -78,7 +78,8 @@ class StructureResponse:
     """Equation (2): the velocities that a force held over the step gives to the bodies.
 
     mass, stiffness, damping: (6n, 6n) sparse, world axes · dt [s] · driven (n,) bool: bodies whose velocity
-    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they do not respond to loads ·
+    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they do not respond to loads · driven_lead
+    (n, 6): that velocity, which is the one at the end of the step, less their mean over it, None: it does not change ·
     afloat (n, 3, 3): K_h for heave, roll and pitch, None: of no body · substep dt_s [s]: of the blocks afloat.
     """
 
@@ -92,7 +93,9 @@ class StructureResponse:
         driven_velocity: Array,
         afloat: Array | None = None,
         substep: float = 0.0,
+        driven_lead: Array | None = None,
     ) -> None:
+        self._driven_lead = driven_lead
         self.dt = dt
         self.mass = mass
         self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
@@ -161,15 +164,16 @@ class StructureResponse:
         return share[:, None]
 
     def lead(self, velocity: Array, before: Array, substep: float) -> Array:
-        """L (n, 6) of (4) from V and V^n (n, 6): the difference between V and the mean velocity over the step; zero
-        for driven bodies.
+        """L (n, 6) of (4) from V and V^n (n, 6): the difference between V and the mean velocity over the step; for
+        driven bodies that of their motion.
 
         substep dt_s [s]."""
         change = (velocity - before).ravel()
         gained = self._held @ change
         if self._restoring is not None:
             gained += self._restoring @ change
-        return 0.5 * (1.0 - substep / self.dt) * self.compliance(gained).reshape(-1, 6)
+        lead = 0.5 * (1.0 - substep / self.dt) * self.compliance(gained).reshape(-1, 6)
+        return lead if self._driven_lead is None else lead + self._driven_lead
 
     def at_end(self, mean: Array, before: Array, substep: float) -> Array:
         """The V (n, 6) of (4) whose mean over the step is mean (n, 6), by the fixed-point iteration V = mean + L(V),

@@ -19,6 +19,7 @@ from yade_scripts.blocks.polyhedra import (
     face_planes,
     polyhedron_moments,
 )
+from yade_scripts.blocks.prescribed import Prescribed
 
 MARGIN = 0.01
 """In contact a face extends beyond its edges by this share of the block's inner radius, so that flush blocks support
@@ -44,7 +45,7 @@ class Block:
     size (3,) [m] of a box, or vertices (k, 3) [m] with faces (lists of rows of vertices, seen from outside)
     of a convex polyhedron; vertices may have any origin, they are moved to the centre of mass
     rotation (3, 3): body frame → world · density [kg/m³] · velocity (3,) [m/s] · spin (3,) [rad/s]
-    fixed: does not move · driven: keeps `velocity` and `spin` whatever acts on it
+    fixed: does not move · driven: keeps `velocity` and `spin` whatever acts on it, or moves as `motion` says
     """
 
     name: str
@@ -60,6 +61,7 @@ class Block:
     driven: bool = False
     velocity: Floats = field(default_factory=lambda: np.zeros(3))
     spin: Floats = field(default_factory=lambda: np.zeros(3))
+    motion: Prescribed | None = None
 
     def __post_init__(self):
         for name, shape in (("centre", (3,)), ("rotation", (3, 3)), ("velocity", (3,)), ("spin", (3,))):

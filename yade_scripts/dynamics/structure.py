@@ -204,6 +204,7 @@ class Structure(StructureReadings):
             self._energy_sums,
             self._impulses,
             ramp,
+            {row: block.motion for row, block in enumerate(self.blocks) if block.motion is not None},
         )
         self._list_bodies()
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
+from yade_scripts.blocks.prescribed import Prescribed
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.dynamics.energy import EnergySums
 from yade_scripts.dynamics.impulses import ImpulseSums
@@ -22,6 +23,8 @@ from yade_scripts.yade_side.scene import Scene
 
 class Substepper:
     """Moves the scene by one substep at a time. load (n, 6) [N, N m] acts in every substep.
+
+    prescribed: motions by the rows of the blocks that are told one, which move in each substep at their mean velocity.
 
     ramp [s]: time over which the weight grows from the start, as τ² (3 - 2 τ); 0: it acts in full at once.
 
@@ -38,7 +41,9 @@ class Substepper:
         energy_sums: EnergySums,
         impulses: ImpulseSums,
         ramp: float = 0.0,
+        prescribed: dict[int, Prescribed] | None = None,
     ):
+        self._prescribed = prescribed or {}
         self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
         self._spin, self._energy_sums, self._impulses = spin, energy_sums, impulses
         self.load = np.zeros((len(scene.ids), 6))
@@ -96,6 +101,8 @@ class Substepper:
         self._impulses.add(dt, m.x, self._joint_F, self._without_contact, self._F)
         if len(self._turning):
             self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
+        for row, motion in self._prescribed.items():
+            self._scene.set_motion(row, np.concatenate([motion.mean_velocity(time, dt), before[row, 3:]]))
         self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
         m.dt = dt
         m.read_watched()

@@ -321,7 +321,8 @@ def _driven_limit(blocks: list[Block], joints, best: SubstepLimit) -> SubstepLim
     if joints is None:
         return best
     for block in (b for b in blocks if b.driven):
-        speed = np.linalg.norm(block.velocity) + np.linalg.norm(block.spin) * block.radius
+        along = np.linalg.norm(block.velocity) if block.motion is None else block.motion.fastest()
+        speed = along + np.linalg.norm(block.spin) * block.radius
         if speed * best.dt > DRIVEN_SHARE * joints.df.min():
             dt = DRIVEN_SHARE * joints.df.min() / speed
             text = f"prescribed motion of block {block.name}, {speed:.4g} m/s"

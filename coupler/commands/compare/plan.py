@@ -111,6 +111,11 @@ def refuse(file: CaseFile) -> None:
             "joints.distribution nor materials with joints of their own (presets). Leave these out and give "
             "joints.strength and joints.opening_at_failure, or compare our own laws by `run --set joints.law=NAME`"
         )
+    if any(motion.velocity is None for motion in case.motion):
+        lines.append(
+            f"{file.path}: motion: `compare` drives blocks at one velocity; write motion.velocity in place of a motion "
+            "over time, or compare our own laws by `run --set joints.law=NAME`"
+        )
     if lines:
         raise BadCase(lines)
 
