@@ -363,14 +363,16 @@ class Joints(Section):
 
 class Motion(Section):
     """A block that moves as prescribed, without turning: the grip of a testing machine, a gate, a wave maker, a shaking
-    table. It has one velocity for the whole run (velocity), or one over time, given here (times and velocities) or in a
-    file (path), linear in between; its place follows from it."""
+    table. It has one velocity for the whole run (velocity), or a table over time, here (times with velocities or
+    displacements) or in a file (path): velocities are linear in between and the place follows from them, displacements
+    lie on a smooth curve (cubic spline) that starts and ends at rest."""
 
     block: Name = Field(description="name of the block")
     velocity: VelocityVector | None = Field(None, description="its velocity for the whole run")
     times: tuple[Annotated[float, InSI("s", ge=0)], ...] = Field(
         (),
-        description="instead: times of velocities, increasing, the first 0; after the last its velocity goes on",
+        description="instead: times of velocities or displacements, increasing, the first 0; after the last its "
+        "velocity goes on, or it stays",
         examples=[["0 s", "0.5 s", "1 s"]],
     )
     velocities: tuple[VelocityVector, ...] = Field(
@@ -378,10 +380,17 @@ class Motion(Section):
         description="velocity at each of these times, linear in between",
         examples=[[[0, 0, 0], ["0.2 m/s", 0, 0], [0, 0, 0]]],
     )
+    displacements: tuple[Point, ...] = Field(
+        (),
+        description="instead of velocities: displacement from the place at the start at each of these times, the first "
+        "zero",
+        examples=[[[0, 0, 0], ["5 cm", 0, 0], [0, 0, 0]]],
+    )
     path: File | None = Field(
         None,
-        description="instead: CSV with the columns time [s] and velocity_x, velocity_y, velocity_z [m/s], at least one "
-        "of them (the others are zero), from the directory of the case",
+        description="instead: CSV with the columns time [s] and velocity_x, velocity_y, velocity_z [m/s], or "
+        "displacement_x, displacement_y, displacement_z [m], at least one of them (the others are zero), from the "
+        "directory of the case",
         examples=["paddle.csv"],
     )
 

@@ -9,7 +9,7 @@ from coupler.case.case import Case
 from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath, Problem
 from coupler.geometry.bodies import Body
-from coupler.geometry.motions import MotionError, motion_of
+from coupler.geometry.motions import KEYS, MotionError, motion_of
 from coupler.geometry.parts import Part, recipes
 
 THROUGH = 1e-3
@@ -97,9 +97,7 @@ def _start(block) -> str:
 
 def _key(motion) -> str:
     """The key by which a motion is given."""
-    return next(
-        key for key in ("velocity", "times", "path", "block") if getattr(motion, key) not in (None, ())
-    )
+    return next(key for key in (*KEYS, "block") if getattr(motion, key) not in (None, ()))
 
 
 def _passed(case: Case, path: KeyPath, block, walls) -> Iterator[Problem]:

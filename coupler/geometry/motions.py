@@ -10,10 +10,16 @@ from array_types import Array
 from coupler.case.paths import BadPath, check_file
 from coupler.case.records import NoSuchData, read_record
 from coupler.program.errors import did_you_mean
-from yade_scripts.blocks.prescribed import Prescribed
+from yade_scripts.blocks.prescribed import Prescribed, PrescribedWay
 
-TIME, VELOCITIES = "time", ("velocity_x", "velocity_y", "velocity_z")
+TIME = "time"
+VELOCITIES = ("velocity_x", "velocity_y", "velocity_z")
+DISPLACEMENTS = ("displacement_x", "displacement_y", "displacement_z")
 """Columns of the file."""
+KEYS = ("velocity", "times", "velocities", "displacements", "path")
+"""Keys of [[motion]] that say how the block moves."""
+TOGETHER = (["velocity"], ["times", "velocities"], ["times", "displacements"], ["path"])
+"""Those of them that belong together."""
 
 
 class MotionError(ValueError):
@@ -28,25 +34,23 @@ def motion_of(spec) -> Prescribed | None:
     """The motion over time of a table [[motion]]; None where it is one velocity for the whole run.
 
     Raises MotionError."""
-    given = [
-        key for key in ("velocity", "times", "velocities", "path") if getattr(spec, key) not in (None, ())
-    ]
-    if given not in (["velocity"], ["times", "velocities"], ["path"]):
+    given = [key for key in KEYS if getattr(spec, key) not in (None, ())]
+    if given not in TOGETHER:
         has = f"it has {' and '.join(given)}" if given else "it has none of them"
         raise MotionError(
             given[0] if given else "block",
-            f"'{spec.block}' moves with velocity, by times and velocities, or by the file path: {has}",
+            f"'{spec.block}' moves with velocity, by times with velocities or displacements, or by the file path: "
+            f"{has}",
         )
     if spec.velocity is not None:
         return None
     if spec.path is not None:
         return _from_file(spec.path)
-    if len(spec.times) != len(spec.velocities):
-        raise MotionError(
-            "velocities",
-            f"{len(spec.velocities)} velocities for {len(spec.times)} times; each time needs one",
-        )
-    return _checked("times", "", np.array(spec.times), np.array(spec.velocities))
+    kind = given[1]
+    values = getattr(spec, kind)
+    if len(spec.times) != len(values):
+        raise MotionError(kind, f"{len(values)} {kind} for {len(spec.times)} times; each time needs one")
+    return _made(("times", kind), "", np.array(spec.times, float), np.array(values, float))
 
 
 def _from_file(path: str) -> Prescribed:
@@ -57,26 +61,31 @@ def _from_file(path: str) -> Prescribed:
         raise MotionError("path", f"{path}: {error}") from error
     except NoSuchData as error:
         raise MotionError("path", " ".join(error.lines)) from error
-    allowed = (TIME, *VELOCITIES)
+    allowed = (TIME, *VELOCITIES, *DISPLACEMENTS)
     for name in columns:
         if name not in allowed:
+            hint = did_you_mean(name, allowed)
             raise MotionError(
-                "path",
-                f"{path}: unknown column '{name}'{did_you_mean(name, allowed)}; known are {', '.join(allowed)}",
+                "path", f"{path}: unknown column '{name}'{hint}; known are {', '.join(allowed)}"
             )
-    if TIME not in columns or len(columns) < 2:
+    kinds = {"velocities": VELOCITIES, "displacements": DISPLACEMENTS}
+    there = [kind for kind, names in kinds.items() if any(name in columns for name in names)]
+    if TIME not in columns or len(there) != 1:
         raise MotionError(
-            "path", f"{path}: it needs the column {TIME} and one at least of {', '.join(VELOCITIES)}"
+            "path",
+            f"{path}: it needs the column {TIME}, and either one at least of {', '.join(VELOCITIES)} or one at least "
+            f"of {', '.join(DISPLACEMENTS)}",
         )
-    time = columns[TIME]
-    zero = np.zeros(len(time))
-    return _checked(
-        "path", f"{path}: ", time, np.column_stack([columns.get(name, zero) for name in VELOCITIES])
-    )
+    times, kind = columns[TIME], there[0]
+    values = np.column_stack([columns.get(name, np.zeros(len(times))) for name in kinds[kind]])
+    return _made(("path", "path"), f"{path}: ", times, values, kind)
 
 
-def _checked(key: str, where: str, times: Array, velocities: Array) -> Prescribed:
-    """Raises MotionError unless the times begin at 0 and increase."""
+def _made(keys: tuple[str, str], where: str, times: Array, values: Array, kind: str = "") -> Prescribed:
+    """keys: of the times and of the values (k, 3) · kind: velocities or displacements, unless the key says it.
+
+    Raises MotionError unless the times begin at 0 and increase, and displacements begin at zero."""
+    key, kind = keys[0], kind or keys[1]
     if len(times) < 2:
         raise MotionError(
             key, f"{where}{len(times)} times; a motion over time needs two at least, or write velocity"
@@ -90,4 +99,11 @@ def _checked(key: str, where: str, times: Array, velocities: Array) -> Prescribe
             key,
             f"{where}time {k + 1} of {len(times)} is {times[k]:g} s, not after {times[k - 1]:g} s; times increase",
         )
-    return Prescribed(times.astype(float), velocities.astype(float))
+    if kind == "velocities":
+        return Prescribed(times, values)
+    if values[0].any():
+        raise MotionError(
+            keys[1],
+            f"{where}the first displacement is {values[0].tolist()} m; it must be zero, the place at the start",
+        )
+    return PrescribedWay.through(times, values)

@@ -70,8 +70,13 @@ def test_a_table_and_a_file_tell_the_same(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "reported"),
     [
-        ("", "motion[0].block: 'paddle' moves with velocity, by times and velocities, or by the file path: it has"),
-        (TABLE + "velocity = [0, 0, 0]\n", "motion[0].velocity: 'paddle' moves with velocity, by times and"),
+        ("", "motion[0].block: 'paddle' moves with velocity, by times with velocities or displacements, or by the"),
+        (TABLE + "velocity = [0, 0, 0]\n", "motion[0].velocity: 'paddle' moves with velocity, by times with"),
+        (TABLE + "displacements = [[0, 0, 0]]\n", "it has times and velocities and displacements"),
+        (
+            "times = [0, 1]\ndisplacements = [[0.1, 0, 0], [0, 0, 0]]\n",
+            "motion[0].displacements: the first displacement is [0.1, 0.0, 0.0] m; it must be zero",
+        ),
         ("times = [0, 1]\n", "it has times"),
         ("times = [0, 1]\nvelocities = [[0, 0, 0]]\n", "motion[0].velocities: 1 velocities for 2 times"),
         ("times = [0]\nvelocities = [[0, 0, 0]]\n", "motion[0].times: 1 times; a motion over time needs two"),
@@ -95,7 +100,8 @@ def test_motions_that_cannot_be_followed(tmp_path, text, reported):
     [
         ("time, velocity_x\n0, 0\n0.2, 1\n0.1, 0\n", "paddle.csv: time 3 of 3 is 0.1 s, not after 0.2 s"),
         ("time, velocty_x\n0, 0\n0.2, 1\n", "unknown column 'velocty_x'; did you mean 'velocity_x'?"),
-        ("time\n0\n0.2\n", "it needs the column time and one at least of velocity_x, velocity_y, velocity_z"),
+        ("time\n0\n0.2\n", "it needs the column time, and either one at least of velocity_x, velocity_y, velocity_z"),
+        ("time, velocity_x, displacement_y\n0, 0, 0\n0.2, 1, 1\n", "it needs the column time, and either one at least"),
         ("velocity_x\n0\n0.2\n", "it needs the column time"),
         ("time, velocity_x\n0, a\n", "no table of numbers under a line of names"),
     ],
@@ -104,6 +110,22 @@ def test_files_of_motions_that_cannot_be_followed(tmp_path, record, reported):
     (line,) = mistakes(tmp_path, 'path = "paddle.csv"\n', record)
     assert "motion[0].path: " in line
     assert reported in line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'times = [0, "0.1 s", "250 ms"]\ndisplacements = [[0, 0, 0], ["2 cm", 0, 0], [0.01, 0, 0]]\n',
+        'path = "paddle.csv"\n',
+    ],
+)
+def test_displacements_are_reached_at_their_times(tmp_path, text):
+    record = "time, displacement_x\n0, 0\n0.1, 0.02\n0.25, 0.01\n"
+    case = load(write(tmp_path, text, record)).case
+    (block,) = (b for part in parts_of(case) for b in part.blocks if b.name == "paddle")
+    for time, place in ((0.0, 0.0), (0.1, 0.02), (0.25, 0.01), (9.0, 0.01)):
+        assert block.motion.way(time) == pytest.approx([place, 0.0, 0.0], abs=1e-15)
+    assert block.motion.velocity(0.0).tolist() == block.motion.velocity(9.0).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_a_motion_that_turns_before_the_wall_is_allowed_and_one_that_passes_it_is_not(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from yade_scripts.blocks.block import Block
-from yade_scripts.blocks.prescribed import Prescribed
+from yade_scripts.blocks.prescribed import Prescribed, PrescribedWay
 from yade_scripts.dynamics.structure import Structure
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.4])
@@ -45,3 +45,19 @@ def test_a_driven_block_is_where_its_motion_takes_it(substep):
         structure.restore(start)
         structure.advance(0.15, substep)
         assert structure.centre()[0] == pytest.approx(MOTION.way(0.15), rel=1e-12)
+
+
+def test_displacements_lie_on_a_smooth_curve():
+    """Through every twentieth of a period of a swing that starts and ends at rest: place and velocity of the swing
+    within the error of a cubic spline, and the largest speed."""
+    omega = 2.0 * np.pi
+    times = np.linspace(0.0, 2.0, 41)
+    swing = PrescribedWay.through(times, np.column_stack([1.0 - np.cos(omega * times), 0 * times, 0 * times]))
+    for time in np.linspace(0.0, 2.0, 77):
+        assert swing.way(time)[0] == pytest.approx(1.0 - np.cos(omega * time), abs=1e-4)
+        assert swing.velocity(time)[0] == pytest.approx(omega * np.sin(omega * time), abs=0.01)
+    assert swing.fastest() == pytest.approx(omega, rel=1e-3)
+    assert swing.fastest(0.9, 0.95) == pytest.approx(omega * np.sin(omega * 0.1), rel=1e-2)
+    assert swing.mean_velocity(0.1, 0.25) == pytest.approx((swing.way(0.35) - swing.way(0.1)) / 0.25)
+    assert {0.5, 1.0, 1.5} <= set(np.round(swing.turning_times(0, 2.0), 6))
+    assert swing.velocity(2.5).tolist() == [0.0, 0.0, 0.0]
