@@ -23,7 +23,7 @@ def rocking(structure: Structure, out: Array, reach: Array) -> Array:
 
     out (n,) bool: blocks whose centre is out of its place now · reach (n,) [m]: farthest that a corner of each block
     may have moved and still be in its place."""
-    found = np.zeros(structure.n, bool)
+    found, out = np.zeros(structure.n, bool), out & ~structure.fixed
     if not out.any():
         return found
     up = _up(structure)

@@ -289,6 +289,15 @@ def test_a_block_that_falls_off_what_rocks_is_out_of_its_place(scene):
     )
 
 
+def test_a_block_that_is_driven_does_not_rock(scene):
+    """Its motion takes it, wherever its weight turns."""
+    s, watch, coupling = scene
+    s.fixed[2] = True
+    tilted(s, 0.3, rows=(2,), toe=(3.5, 0.0, 0.0))
+    watch.step(coupling, record(0.4))
+    assert verdict(s, watch)["displaced"] == {"blocks": 0, "back": 0, "rocking": 0, "first": None, "list": []}
+
+
 def test_a_block_that_lost_a_support_does_not_rock(scene):
     """One edge of its base is in its place and ahead of its centre, which has fallen."""
     s, watch, coupling = scene
