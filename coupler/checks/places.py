@@ -19,12 +19,16 @@ from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import is_basin, is_measured, mesh_of, tank_places
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.geometry.terrain.grid import TerrainError
+from coupler.geometry.terrain.standing import ground_surface
 from coupler.program.memory import memory
 
 Placed = tuple[KeyPath, str, Body]
 
 TOUCH = 1e-5
 """Overlap below this share of the smallest width is contact, not overlap (rounding of decimals and of files)."""
+
+INTO = 1e-3
+"""Share of its thickness by which a block may reach into a terrain, which is uneven."""
 
 
 def mesh_size(tank) -> tuple[int, int]:
@@ -68,7 +72,38 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     yield from _fills(case)
     yield from _overlaps(solids, blocks, [b.name for part in parts for b in part.blocks])
     yield from _outside(case, solids, blocks, [b.name for part in parts for b in part.blocks])
+    yield from _in_terrain(case, parts)
     yield from _submerged_fills(case, [*solids, *blocks])
+
+
+def _in_terrain(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Blocks that are not held, with corners in the ground of a terrain: the contacts of the first step throw them."""
+    ground = ground_surface(case)
+    if ground is None:
+        return
+    driven = {motion.block for motion in case.motion}
+    for part in parts:
+        worst = None
+        for block in part.blocks:
+            if block.fixed or block.name in driven:
+                continue
+            corners = block.world_vertices()
+            depth = ground.height(corners) - corners[:, 2]
+            k = int(depth.argmax())
+            if depth[k] > INTO * 2.0 * float(block.planes[1].min()) and (
+                worst is None or depth[k] > worst[0]
+            ):
+                worst = float(depth[k]), corners[k], block.name
+        if worst is not None:
+            depth, place, name = worst
+            which = "" if name == part.name else f" (block {name})"
+            has_on = part.path[1] in ("wall", "building")
+            yield (
+                part.path,
+                f"'{part.name}' reaches {depth:.4g} m into the terrain at ({place[0]:.6g}, {place[1]:.6g}) m, where "
+                f"the ground is at z = {place[2] + depth:.6g} m{which}; raise it"
+                + (', or let it stand there on a footing with on = "terrain"' if has_on else ""),
+            )
 
 
 def corners_in_order(path: KeyPath, box) -> Iterator[Problem]:

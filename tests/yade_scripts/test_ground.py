@@ -34,6 +34,17 @@ def test_ground_goes_on_level_outwards(place, gradient, mirrored):
     np.testing.assert_allclose(-normal[:2] / normal[2], gradient, atol=1e-12)
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_heights_of_many_places_are_those_of_the_kernel(mirrored):
+    rng = np.random.default_rng(3)
+    z = rng.uniform(0.0, 2.0, (len(X), len(Y)))
+    ground = GroundSurface((1.0, -2.0, 5.0), UP, x=X, y=Y, z=z, mirrored=mirrored)
+    places = rng.uniform((-1, -4, 0), (13, 4, 0), (200, 3))
+    row, normal = ground.as_row(0), np.zeros(3)
+    wanted = [5.0 + surface_at(row, x - 1.0, y + 2.0, normal) for x, y, _ in places]
+    np.testing.assert_allclose(ground.height(places), wanted, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("slope", [SLOPE, -SLOPE])
 def test_block_beyond_the_edge_stays_where_it_is(slope):
     """Without friction: with the normal of the last triangle it slid at slope g, and its energy grew."""

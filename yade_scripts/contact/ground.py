@@ -72,6 +72,22 @@ class GroundSurface(FixedPlane):
         highest = np.maximum.reduce([self.z[i + p, j + q] for p in (0, 1) for q in (0, 1)])
         return self.upright * (points[:, 2] - self.point[2] - highest)
 
+    def height(self, points: Array) -> Array:
+        """z (k,) [m] of the ground at the places of points (k, 2 or 3), as `surface_at` has it for one."""
+        x, y = (np.clip(points[:, k] - self.point[k], a[0], a[-1]) for k, a in enumerate((self.x, self.y)))
+        i = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
+        j = np.clip(np.searchsorted(self.y, y, side="right") - 1, 0, len(self.y) - 2)
+        s = (x - self.x[i]) / (self.x[i + 1] - self.x[i])
+        t = (y - self.y[j]) / (self.y[j + 1] - self.y[j])
+        z00, z10, z01, z11 = (self.z[i + p, j + q] for q in (0, 1) for p in (0, 1))
+        plain = np.where(s >= t, s * (z10 - z00) + t * (z11 - z10), t * (z01 - z00) + s * (z11 - z01))
+        other = np.where(
+            s + t <= 1.0,
+            s * (z10 - z00) + t * (z01 - z00),
+            z11 - z00 - (1.0 - s) * (z11 - z01) - (1.0 - t) * (z11 - z10),
+        )
+        return self.point[2] + z00 + np.where(self.mirrored & ((i + j) % 2 == 1), other, plain)
+
 
 @inner
 def _interval(axis, value):
