@@ -24,6 +24,9 @@ from fluid.numerics.spans import spans
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import over, taken
 
+NO_WATER = 1e-9
+"""Share of what a node can hold up to which its water counts as none: what sums of what comes and goes leave over."""
+
 
 @dataclass(frozen=True)
 class Topology:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.domain.layers import WORK
+from fluid.domain.topology import NO_WATER
 from kernels.decorators import inner, ranged
 from kernels.threads import over, taken
 
@@ -35,7 +36,7 @@ class Borne:
         self._outside, self._wet, self._water = outside, wet, water
         self._nodes, self._around = topology.nodes, topology.around_by_cells
         self._borne, self._total = np.zeros(len(wet)), np.zeros(len(wet))
-        state = (water, fast, np.zeros(0) if in_jumps is None else in_jumps)
+        state = (water, topology.node_volume, fast, np.zeros(0) if in_jumps is None else in_jumps)
         made = (self._borne, self._total)
         over(_to_be_borne, len(outside), *self._rows(), state, made, weight=WORK)
         beside = np.zeros(len(wet), bool)
@@ -65,11 +66,11 @@ def _weight(i, j, shared, nodes):
 @ranged
 def _to_be_borne(first, last, outside, wet, nodes, around_by_cells, state, made):
     """made: s W (N,) [m³], and the sum of the weights of the nodes in the water around (N,), both zero at first."""
-    (water, fast, in_jumps), (borne, total) = state, made
+    (water, capacity, fast, in_jumps), (borne, total) = state, made
     start, around, shared = around_by_cells
     for s in range(first, last):
         i = np.uint64(outside[np.uint64(s)])
-        if water[i] <= 0.0 or fast[i] <= 0.0:
+        if water[i] <= NO_WATER * capacity[i] or fast[i] <= 0.0:
             continue
         for t in range(start[i], start[i + np.uint64(1)]):
             if wet[around[t]]:

@@ -51,10 +51,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from array_types import Array
-from fluid.domain.topology import Graph, Topology
+from fluid.domain.topology import NO_WATER, Graph, Topology
 from fluid.numerics.fields import copied, places_of
 from fluid.surface.volume import Flux, Shift, diffused_shift
-from fluid.transport.velocity_transport import NO_WATER, carry_velocity
+from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
 from kernels.decorators import inner, ranged, released
 from kernels.threads import over, zeros

@@ -14,14 +14,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluid.domain.topology import NO_WATER
 from fluid.mesh.arrays import Edges
 from kernels.decorators import inner, ranged
 from kernels.threads import over, owning, reach_of_rows
 
 NONE = np.empty(0)
 """No field (N,)."""
-NO_WATER = 1e-10
-"""Share of what a node can hold up to which its water counts as none: what sums of what comes and goes leave over."""
 
 
 def carry_velocity(nodes, edges: Edges, moved, volumes, u, gain=NONE):
