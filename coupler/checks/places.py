@@ -78,9 +78,9 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
 
 def _in_terrain(case: Case, parts: list[Part]) -> Iterator[Problem]:
     """Blocks that are not held, with corners in the ground of a terrain: the contacts of the first step throw them."""
-    ground = ground_surface(case)
-    if ground is None:
+    if not parts or case.tank is None or case.tank.ground is None:
         return
+    ground = ground_surface(case)
     driven = {motion.block for motion in case.motion}
     for part in parts:
         worst = None

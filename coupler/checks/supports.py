@@ -16,6 +16,7 @@ from coupler.checks.softness import STANDING, bed_at
 from coupler.geometry.parts import Part, parts_of
 from coupler.geometry.solid_ground import tops_below
 from coupler.geometry.solids import obstacle_blocks
+from coupler.geometry.tank_mesh import is_measured
 from coupler.program.quantities import length
 
 INSIDE = 1e-3
@@ -26,7 +27,7 @@ at the same edge."""
 def ground_problems(case: Case) -> Iterator[Problem]:
     """A plane ground below the floor of the tank, which it takes the place of: blocks fall out of the water."""
     tank, ground = case.tank, case.structure.ground
-    if tank is None or ground is None or not tank.is_box or "z-" in tank.open:
+    if tank is None or ground is None or not tank.is_box or not is_measured(tank) or "z-" in tank.open:
         return
     if ground.level < tank.lower[2] - 1e-6 * tank.cell:
         yield (

@@ -89,3 +89,7 @@ def test_blocks_on_a_ground_that_water_flows_under_are_remarked_on():
     assert "tank.lower[2] = 0.5" in said
     quay = {"name": "quay", "centre": [6, 2, 0.25], "size": [4, 4, 0.5]}
     assert not list(support_remarks(grounded(0.5, 0.5, solid=[quay])))
+
+
+def test_a_ground_in_a_tank_without_its_corners_is_left_to_what_is_said_of_the_tank():
+    assert problems(made(tank={"upper": [8, 4, 3]})) == []  # its missing keys are told where it is read

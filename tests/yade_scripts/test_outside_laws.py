@@ -229,10 +229,10 @@ def test_a_law_that_does_not_fall_to_zero_is_noted(forgotten, tmp_path):
     )
     (tmp_path / "half.py").write_text(text)
     surgebreak.register_law(tmp_path / "half.py")
-    (tmp_path / "case.toml").write_text(TWO_BLOCKS.replace('law = "bilinear"', 'law = "half"'))
+    (tmp_path / "case.toml").write_text(STANDING.replace('law = "bilinear"', 'law = "half"'))
     (line,) = remarks(load(tmp_path).case)
     assert line.startswith("law 'half' does not fall to zero: at opening_at_failure it still carries 50%")
-    (tmp_path / "case.toml").write_text(TWO_BLOCKS)
+    (tmp_path / "case.toml").write_text(STANDING)
     assert remarks(load(tmp_path).case) == []
 
 
@@ -252,3 +252,4 @@ strength = "1 MPa"
 opening_at_failure = "1 mm"
 law = "bilinear"
 """
+STANDING = TWO_BLOCKS.replace("[structure]\n", "[structure]\nground = { level = 0 }\n")
