@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,9 @@ from array_types import Array
 from coupler.case.paths import BadPath, check_file
 from coupler.case.records import NoSuchData, read_record
 from coupler.program.errors import did_you_mean
-from yade_scripts.blocks.prescribed import Prescribed, PrescribedWay
+
+if TYPE_CHECKING:
+    from yade_scripts.blocks.prescribed import Prescribed
 
 TIME = "time"
 VELOCITIES = ("velocity_x", "velocity_y", "velocity_z")
@@ -85,6 +88,8 @@ def _made(keys: tuple[str, str], where: str, times: Array, values: Array, kind: 
     """keys: of the times and of the values (k, 3) · kind: velocities or displacements, unless the key says it.
 
     Raises MotionError unless the times begin at 0 and increase, and displacements begin at zero."""
+    from yade_scripts.blocks.prescribed import Prescribed, PrescribedWay
+
     key, kind = keys[0], kind or keys[1]
     if len(times) < 2:
         raise MotionError(

@@ -531,7 +531,7 @@ def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
         "water": {"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.5]}]},
     }
     assert problems(Case.model_validate(content)) == []
-    monkeypatch.setattr("coupler.checks.places.os.sysconf", lambda name: 1000)
+    monkeypatch.setattr("coupler.program.memory.os.sysconf", lambda name: 1000)
     ((place, message),) = problems(Case.model_validate(content))
     assert place == ("tank", "cell")
     fits = float(message.rpartition("cells of ")[2].split()[0])

@@ -21,7 +21,15 @@ def checkout(folder):
         "__init__.py",
         *(
             f"program/{n}.py"
-            for n in ("__init__", "arithmetic", "errors", "process", "provenance", "threads")
+            for n in (
+                "__init__",
+                "arithmetic",
+                "control_groups",
+                "errors",
+                "process",
+                "provenance",
+                "threads",
+            )
         ),
     ):
         shutil.copy(ROOT / "coupler" / name, folder / "coupler" / name)
