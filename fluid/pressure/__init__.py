@@ -1,6 +1,7 @@
 """The pressure: its matrix, right hand side and bounds (theory 2.2).
 
 projection              mass balance with moving walls, and the correction of the velocity
+damping                 motions that the pressure does not see
 active_cells            which nodes and cells take part
 indefinite_cells        obtuse cells at the surface that would make the matrix indefinite
 pressure_bound          how far the pressure may fall: to that of the air, to vapour pressure elsewhere

@@ -18,13 +18,11 @@ from fluid.domain.cell_vectors import CellVectors, first_from
 from fluid.numerics.fields import copied_at, less
 from fluid.numerics.multigrid import unsigned
 from fluid.numerics.sums import dots, kinetic_energies, kinetic_energy
+from fluid.pressure.damping import Waterline, damp_divergence, damp_waterline
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
-    Waterline,
     WetCells,
     cell_gradient,
-    damp_divergence,
-    damp_waterline,
     nodal_mean,
     with_ghosts,
 )

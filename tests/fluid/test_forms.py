@@ -15,12 +15,11 @@ from fluid.domain.quadrature import surface_basis
 from fluid.domain.topology import Graph, Topology
 from fluid.mesh.background import Background, box_mesh
 from fluid.numerics.solve import solve
+from fluid.pressure.damping import Waterline, damp_divergence
 from fluid.pressure.projection import (
-    Waterline,
     WetCells,
     cell_gradient,
     cell_velocity,
-    damp_divergence,
     inflow,
     nodal_mean,
     pressure_matrix,
