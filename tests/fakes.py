@@ -106,9 +106,8 @@ class FreeBody:
         ]
         self.mass = np.array([density * np.prod(size)])
         self.fixed = self.still = np.array([False])
-        self.blocks = [
-            SimpleNamespace(fixed=False, motion=None, centre=np.array(centre, float), rotation=np.eye(3))
-        ]
+        self.prescribed = {}
+        self.blocks = [SimpleNamespace(fixed=False, centre=np.array(centre, float), rotation=np.eye(3))]
         self._g = np.array([0, 0, -gravity])
         self._x, self._v = np.array([centre], float), np.zeros((1, 6))
         self._load, self._work = np.zeros((1, 6)), 0.0

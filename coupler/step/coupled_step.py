@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from coupler.step.pressure_with_structure import CoupledSolution, StructureResponse
     from fluid.pressure.projection import PressureProblem
     from fluid.step.water import Water
-    from yade_scripts.blocks.prescribed import Prescribed
     from yade_scripts.dynamics.structure import AdvanceReport, Structure
 
 
@@ -123,7 +122,7 @@ class CoupledStepper:
             dt = min(dt, self.water.stable_step())
         if self.coupled:
             speed = fastest_points(self.structure.velocity(), self.radius)
-            for row, motion in self._told():
+            for row, motion in self.structure.prescribed.items():
                 speed[row] = max(speed[row], motion.fastest(self.time, self.time + dt))
             if speed.any():
                 way = BLOCK_COURANT * self.immersion.cell_sizes()
@@ -403,18 +402,13 @@ class CoupledStepper:
             substep=0.0 if afloat is None else dt / structure.count_substeps(dt),
         )
 
-    def _told(self) -> list[tuple[int, Prescribed]]:
-        """Rows of the blocks that are told a motion over time, and their motions."""
-        return [(row, b.motion) for row, b in enumerate(self.structure.blocks) if b.motion is not None]
-
     def _prescribed(self, velocity: Array, dt: float) -> tuple[Array, Array | None]:
         """velocity (n, 6) with that at the end of the step for blocks that are told a motion over time, and how much
         more (n, 6) that is than their mean over the step; None where no block is."""
-        told = self._told()
-        if not told:
+        if not self.structure.prescribed:
             return velocity, None
         velocity, lead = velocity.copy(), np.zeros_like(velocity)
-        for row, motion in told:
+        for row, motion in self.structure.prescribed.items():
             velocity[row, :3] = motion.velocity(self.time + dt)
             lead[row, :3] = velocity[row, :3] - motion.mean_velocity(self.time, dt)
         return velocity, lead

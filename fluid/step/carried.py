@@ -28,6 +28,7 @@ def carried_by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
 
 
 def _by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
+    """What they make of it on the domain where the velocity was projected, before solids moved on."""
     u, a, phi, t = water.left_behind or (water.velocity, water.acceleration, water.level_set, water.topology)
     p, flux = water.parameters, water.flux.over(t, dt)
     if water.left_behind is not None:

@@ -235,6 +235,8 @@ class Water:
         return factor
 
     def kick_factor_of(self, acceleration, size, fastest):
+        """`kick_factor` (N,) of an acceleration (N, 3) [m/s²] on cells of these sizes (N,) [m], under water whose
+        largest velocity is `fastest` [m/s]."""
         p = self.parameters
         return kick_factor(acceleration, p.kick_limit * p.gravity, 0.5 * fastest**2, size)
 
@@ -458,6 +460,7 @@ class Water:
         return np.where(wet, self.parameters.density * (below - top), 0.0)
 
     def dry_if_inactive(self, level):
+        """The level set (N,) [m], far above the water at nodes that take no part."""
         return np.where(self.topology.active, level, FAR * self.topology.node_size)
 
     # ---- sides of the tank

@@ -53,7 +53,7 @@ def _new_velocity(first, last, nodes, volumes, change, volume, u):
     water, capacity = volumes
     for s in range(first, last):
         i = nodes[s]
-        if volume[i] > max(1e-9 * water[i], NO_WATER * capacity[i]):
+        if volume[i] > NO_WATER * max(water[i], capacity[i]):
             for k in range(3):
                 u[i, k] = (max(water[i], 0.0) * u[i, k] + change[i, k]) / volume[i]
 

@@ -140,6 +140,8 @@ class Structure(StructureReadings):
         self.volume = np.array([b.volume for b in blocks])
         self.fixed = np.array([b.fixed or b.driven for b in blocks], bool)
         """Blocks whose motion is prescribed: still, or driven at their velocity."""
+        self.prescribed = {row: b.motion for row, b in enumerate(self.blocks) if b.motion is not None}
+        """Motions over time by the rows of the blocks that are told one."""
         self.shape_vertices: list[Array] = [np.asarray(b.vertices) for b in blocks]
         self.shape_faces = [[list(f) for f in b.faces] for b in blocks]
         self.gravity = np.asarray(gravity, float)
@@ -204,7 +206,7 @@ class Structure(StructureReadings):
             self._energy_sums,
             self._impulses,
             ramp,
-            {row: block.motion for row, block in enumerate(self.blocks) if block.motion is not None},
+            self.prescribed,
         )
         self._list_bodies()
 
