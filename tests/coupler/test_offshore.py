@@ -155,6 +155,8 @@ def test_before_the_first_call_the_case_names_a_record_that_is_not_there(tmp_pat
     path = made(tmp_path)
     (tmp_path / "wave.csv").unlink()
     assert _case_at_the_coast(read(path)).tank.lower == (300, 0, -5)
+    (tmp_path / "case.toml").write_text(NEAR, encoding="utf-8-sig")  # as editors of Windows do
+    assert _case_at_the_coast(read(path)).tank.lower == (300, 0, -5)
     (tmp_path / "case.toml").write_text(NEAR.replace('"wave.csv"', '"other.csv"'))
     with pytest.raises(BadCase, match=r"other\.csv: no such file"):
         _case_at_the_coast(read(path))

@@ -11,6 +11,7 @@ import numpy as np
 from array_types import Array
 from coupler.case.case import Case
 from coupler.case.inflow_records import ALONG, COLUMNS, DRY, SIDEWAYS, record_of
+from coupler.case.paths import BadPath, read_text
 from coupler.checks.read_case import load
 from coupler.commands.offshore.file import Offshore, read
 from coupler.geometry.terrain.grids import read_grid
@@ -69,8 +70,8 @@ def _case_at_the_coast(found: Offshore) -> Case:
 def _inflows_with(file: Path, record: Path) -> list[int]:
     """Numbers of the inflows of a case file that name a record; none where the file is no case."""
     try:
-        water = tomllib.loads(file.read_text(encoding="utf-8")).get("water", {})
-    except (OSError, ValueError):
+        water = tomllib.loads(read_text(file)).get("water", {})
+    except (BadPath, ValueError):  # told by `load`
         return []
     inflows = water.get("inflow", []) if isinstance(water, dict) else []
     paths = [spec.get("path") if isinstance(spec, dict) else None for spec in inflows]
