@@ -236,7 +236,10 @@ def _is_utf_8(text: str) -> bool:
 
 def _shown(path: Path) -> str:
     """The path as the user is likely to write it: relative to the working directory if it lies below."""
-    here = Path.cwd()
+    try:
+        here = Path.cwd()
+    except FileNotFoundError:  # the working directory was removed
+        return str(path)
     return str(path.relative_to(here) if path.is_absolute() and path.is_relative_to(here) else path)
 
 

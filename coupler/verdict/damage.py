@@ -185,7 +185,7 @@ def _of_group(
     area = _share(joints.area[broken].sum(), joined)
     area_torn = _share((joints.area[torn] * joints.torn[torn]).sum(), joined)
     weight, weight_out = (_share(blocks.mass[of].sum(), blocks.mass[rows].sum()) for of in (left, out))
-    state, rule = state_of(area, weight_out, (len(left), len(out)), rules, area_torn)
+    state, rule = state_of(area, weight_out, (len(left), len(out)), rules, area_torn, joined=len(own) > 0)
     return Damage(
         name=name,
         blocks=len(rows),
@@ -213,9 +213,11 @@ def state_of(
     blocks_moved: tuple[int, int],
     rules: Rules,
     area_torn: float = 0.0,
+    *,
+    joined: bool = True,
 ) -> tuple[State, str]:
     """The state and the rule that decided it, from shares of the joined area and of the weight, and from the numbers of
-    blocks that left their place and that stay out of it."""
+    blocks that left their place and that stay out of it. joined: whether there are joints at all."""
     moved, out = blocks_moved
     failed = min(area_broken + area_torn, 1.0)
     which = (
@@ -241,7 +243,7 @@ def state_of(
             f"{_percent(failed)} of its joined area is {which} "
             f"(rule: damaged from more than {rules.damaged_joints:.0%}, verdict.damaged_joints)"
         )
-    return State.STANDS, "no joint broke and no block left its place"
+    return State.STANDS, "no joint broke and no block left its place" if joined else "no block left its place"
 
 
 def _share(part: float, whole: float) -> float:

@@ -77,6 +77,19 @@ def test_a_case_is_read_and_checked_once(words, tmp_path, monkeypatch):
     assert len(seen) == 1
 
 
+def test_a_case_is_read_from_a_working_directory_that_was_removed(tmp_path):
+    write(tmp_path, WATER)
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    code = (
+        f"import os, sys; sys.path.insert(0, {str(ROOT)!r}); os.chdir({str(gone)!r}); os.rmdir({str(gone)!r});"
+        "from coupler.checks.read_case import load; from pathlib import Path;"
+        f"print(load(Path({str(tmp_path)!r})).case.time.end)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_set_and_end_are_checked_like_the_file(tmp_path):
     write(tmp_path, WATER)
     done = surgebreak("check", tmp_path, "--set", "water.density=-1")

@@ -11,7 +11,7 @@ from coupler.checks.case import problems
 from coupler.commands.report.stands import stands
 from coupler.results.history import read_history
 from coupler.run.summary import read_summary
-from coupler.verdict.damage import Rules
+from coupler.verdict.damage import Rules, state_of
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import _largest, places_of, verdict
 from coupler.verdict.watch import Peaks, Watch
@@ -150,6 +150,12 @@ def test_nothing_happened(scene):
     assert reported["largest"]["force"] is None
     assert "no joint of 2 broke" in list(sentences(reported))
     assert "until the run ended at t = 0.1 s" in unreached(reported, 0.1)
+
+
+def test_blocks_without_joints_are_not_said_to_keep_them():
+    rules = {joined: state_of(0.0, 0.0, (0, 0), Rules(), joined=joined)[1] for joined in (True, False)}
+    assert "joint" in rules[True]
+    assert rules[False] == "no block left its place"
 
 
 def test_a_base_that_gapes_is_said_to_hold_by_a_part_of_its_face(scene):

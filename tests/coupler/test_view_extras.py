@@ -1,5 +1,6 @@
 """White water where water is torn, the way to the north, and a camera among the blocks."""
 
+import json
 import subprocess
 import sys
 
@@ -83,3 +84,18 @@ def test_north_turns_with_the_terrain(tmp_path):
     x, y, without = told(code).split()
     assert (float(x), float(y)) == pytest.approx((-1.0, 0.0), abs=1e-12)
     assert without == "None"
+
+
+def test_lines_of_a_caption_are_about_as_long_as_one_another(tmp_path):
+    """No size such as 20 m x 10 m x 12 m is cut off at its last word where two lines are needed anyway."""
+    title = "A water column of 10 m breaks a building of 20 m x 10 m x 12 m"
+    (tmp_path / "run.json").write_text(json.dumps({"case": {"case": {"title": title}}}), encoding="utf-8")
+    code = (
+        "from types import SimpleNamespace as S; from pathlib import Path;"
+        "from coupler.commands.view.captions import caption_of;"
+        f"print(caption_of(S(directory=Path({str(tmp_path)!r}), water=None, blocks=None), 57))"
+    )
+    lines = told(code).splitlines()
+    assert " ".join(lines) == title
+    assert len(lines) == 2
+    assert abs(len(lines[0]) - len(lines[1])) < 10

@@ -10,14 +10,23 @@ from coupler.program.quantities import counted
 
 
 def caption_of(run, width):
-    """Title of the case, then number of cells and blocks, in lines of at most width letters, broken between words."""
+    """Title of the case, then number of cells and blocks, in lines of at most width letters, broken between words so
+    that the lines of the title are about as long as one another."""
     counts = []
     if run.water:
         counts.append(counted(len(run.water.at(run.water.times[0]).cells), "cell"))
     if run.blocks:
         counts.append(counted(int(run.blocks.at(run.blocks.times[0])["block"].max()) + 1, "block"))
     title = _entry(run, "case", "case", "title") or run.directory.name
-    return "\n".join([*textwrap.wrap(title, max(width, 1)), *([", ".join(counts)] if counts else [])])
+    return "\n".join([*_evenly(title, max(width, 1)), *([", ".join(counts)] if counts else [])])
+
+
+def _evenly(text, width):
+    """Lines of a text, as few as `width` letters allow, the longest as short as it can be then."""
+    lines = textwrap.wrap(text, width)
+    while width > 1 and len(narrower := textwrap.wrap(text, width - 1)) == len(lines):
+        lines, width = narrower, width - 1
+    return lines
 
 
 def north_of(run):
