@@ -20,17 +20,8 @@ Then φ takes the shift ψ that brings its own volume there,
 
 which spreads over a length of the order of κ. That evens out splashes, but of what paths and volumes differ by in a
 long wave a step corrects only a part, and a surface that lags behind its water feeds the wave (2 % of its amplitude a
-period at 28 cells a length and κ = 5 h): κ falls to h in calm water. What the total volume is off after that (c
-belongs to the surface before, which in a sheet of a cell or two moves by much of its thickness) is corrected by a last
-shift, which is counted and reported,
-
-    s (|ψ| + ε |d|),        d = Σ_pool (W - ∫_{φ<ψ} N dV) / Σ_pool c,                                      (3)
-
-with one s for all nodes: along the surface as far as ψ has moved it, and alike in a pool where it has not. In pools
-that are off in the other way than the whole, d is zero: with one d for all, a still basin behind a wall lost a
-three-hundredth of its water while a column collapsed before the wall. By one
-length d everywhere, the water of a weir 0.6 m high on cells of 0.1 m came to its nappe by sinking surfaces: of the
-discharge only 0.82 went through the middle of the basin (now 0.99).
+period at 28 cells a length and κ = 5 h): κ falls to h in calm water. What the total volume is off after that is
+corrected by a last shift (`last_shift.py`).
 """
 
 from __future__ import annotations
@@ -47,17 +38,14 @@ from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import PAIR, Graph
 from fluid.numerics.fields import PLAIN, added, copied, places_of
+from fluid.surface.last_shift import LAST_SHIFTS, lower, met_total
 from fluid.surface.level_set import drain_films
-from fluid.surface.pools import own_shift, pools
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import CHUNK, found_over, over, owning, owns_any, reach_of_cells, summed
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
-LARGEST_LAST_SHIFT = 0.1
-EVERYWHERE = 0.1
 ANCHOR = 1e-3
-MOST_SECANTS = 4
 VOLUME_TOLERANCE = 1e-6
 AHEAD, SAME_STEP = 2.0, 1e-9
 """Most steps like the last one for which its change of the velocity goes on in one; difference of two steps over their
@@ -65,9 +53,8 @@ length that counts as round-off."""
 DIVIDED = 0.3
 """Cost of a row of a vector that is divided by the diagonal, in usual rows."""
 _PROBE = 0.05
-"""Half width of the band of (2), limits of the shifts and step of the difference for c, in cell sizes; ε of (3); share
-of V/h added to c, so that regions without surface stay where they are; secant steps for the total volume and their
-relative tolerance."""
+"""Half width of the band of (2), limit of its shift and step of the difference for c, in cell sizes; share of V/h added
+to c, so that regions without surface stay where they are; relative tolerance of the total volume."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,8 +318,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     n = len(phi)
     seen = np.zeros(n, bool)
     seen[listed] = True
-    most = LARGEST_SHIFT + LARGEST_LAST_SHIFT
-    inner, near = _parted(topology, seen, phi, most, spacing)
+    inner, near = _parted(topology, seen, phi, LARGEST_SHIFT + LAST_SHIFTS[0], spacing)
     own = added(inner, nodal_water(near, 0.0, phi, topology.parts, n))
     slope = _volume_slope(topology, near, phi, spacing, seen)
     band = found_over(_in_band, len(listed), listed, phi, spacing)
@@ -340,15 +326,22 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     c, residual = np.empty(len(band)), np.empty(len(band))
     over(_equation, len(band), band, slope, topology.node_volume, spacing, (carried, own), c, residual)
     shift = diffused_shift(band, place, graph.edges, c, residual, kappa, spacing, 1e-2, 40)
-    phi = copied(phi)
-    over(_lower, len(band), band, phi, shift, LARGEST_SHIFT, spacing, phi)
-    left = target - float(inner.sum())
+    moved = copied(phi)
+    over(lower, len(band), band, moved, shift, LARGEST_SHIFT, spacing, moved)
     tolerance = VOLUME_TOLERANCE * abs(target)
-    phi, of_near, reinserted = _meet_total(
-        topology, near, phi, (band, slope, shift), (carried, inner, left), tolerance, spacing
-    )
+    for most in LAST_SHIFTS:
+        if most > LAST_SHIFTS[0]:
+            inner, near = _parted(topology, seen, phi, LARGEST_SHIFT + most, spacing)
+        left = target - float(inner.sum())
+        shifted, of_near, reinserted = met_total(
+            topology, near, moved, (band, slope, shift), (carried, inner, left), tolerance, most, spacing
+        )
+        if abs(left - float(of_near.sum())) <= tolerance:
+            break
+    if drain_films(shifted, spacing):
+        of_near = nodal_water(near, 0.0, shifted, topology.parts, n)
     return VolumeCorrection(
-        level_set=phi,
+        level_set=shifted,
         nodal_water=added(inner, of_near),
         uncorrected_water=own,
         reinserted=reinserted,
@@ -376,14 +369,6 @@ def _equation(first, last, band, slope, capacity, spacing, water, c, residual):
         i = band[s]
         c[s] = slope[i] + ANCHOR * capacity[i] / spacing[i]
         residual[s] = carried[i] - own[i]
-
-
-@ranged
-def _lower(first, last, band, phi, shift, most, spacing, out):
-    """φ (N,) less the shift (n,) within ± most cells, in `out` (N,) at the nodes of the band (n,)."""
-    for s in range(first, last):
-        i, limit = band[s], most * spacing[band[s]]
-        out[i] = phi[i] - min(max(shift[s], -limit), limit)
 
 
 def _parted(t, seen, phi, most, spacing):
@@ -489,54 +474,6 @@ def _probed(first, last, runs, cell_list, phi, spacing, parts, held):
             held[0, i] = max((held[0, i] - held[1, i]) / (2 * (_PROBE * spacing[i])), 0.0)
         else:
             held[0, i] = 0.0
-
-
-def _meet_total(t, near, phi, moved, wanted, tolerance, spacing):
-    """φ after the last shift (3), which brings the water in the cells `near` to a target [m³] within a tolerance [m³],
-    that water (N,) [m³], and the volume [m³] that the shift moved.
-
-    moved: the band (n,), c (N,) [m²] and ψ (n,) [m] of (2) · wanted: W and what is in other cells (N,) [m³], target.
-    Secant steps on s of (3); where they do not reach the target within LARGEST_LAST_SHIFT of the cells at each node, on
-    |d| alone, and in the end on one length for all."""
-    (band, slope, psi), (carried, inner, target) = moved, wanted
-    before = nodal_water(near, 0.0, phi, t.parts, len(phi))
-    start = float(before.sum())
-    shifted, held = phi, before
-    if abs(target - start) > tolerance and slope.sum() > 0.0:
-        uniform = np.full(len(band), abs(target - start) / slope.sum())
-        label, count = pools(phi, *t.around)
-        own = uniform
-        if count > 1:
-            own = own_shift(label, count, carried - inner - before, slope, target - start)[band]
-        for way in (np.abs(psi) + EVERYWHERE * own, own, uniform)[: 3 if count > 1 else 2]:
-            shifted, held = _along(t, near, (phi, before), (band, slope, way), target, tolerance, spacing)
-            if abs(target - float(held.sum())) <= tolerance:
-                break
-    moved_volume = float(held.sum()) - start
-    if drain_films(shifted, spacing):
-        held = nodal_water(near, 0.0, shifted, t.parts, len(phi))
-    return shifted, held, moved_volume
-
-
-def _along(t, near, state, moved, target, tolerance, spacing):
-    """φ (N,) and its water (N,) [m³] in the cells `near` after secant steps along a way (n,) [m] on the band, each node
-    within LARGEST_LAST_SHIFT of its cells; state: both before, moved: band, c and the way."""
-    (phi, held), (band, slope, way) = state, moved
-    shifted, s, volume = phi, 0.0, float(held.sum())
-    area = float(slope[band] @ way)
-    most = LARGEST_LAST_SHIFT * float((spacing[band] / np.maximum(way, 1e-300)).max())
-    for _ in range(MOST_SECANTS):
-        if abs(target - volume) <= tolerance or area <= 0.0:
-            break
-        trial = float(np.clip(s + (target - volume) / area, -most, most))
-        if trial == s:
-            break
-        shifted = copied(phi) if shifted is phi else shifted
-        over(_lower, len(band), band, phi, trial * way, LARGEST_LAST_SHIFT, spacing, shifted)
-        held = nodal_water(near, 0.0, shifted, t.parts, len(phi))
-        before, volume = volume, float(held.sum())
-        area, s = (volume - before) / (trial - s), trial
-    return shifted, held
 
 
 def nodal_volume(topology, phi):

@@ -9,10 +9,10 @@ from tests.fluid.scenes import tank
 LEVEL = 0.5
 
 
-def corrected(lacks, total):
-    """φ (N,) and shift of a pool whose nodes on the side x < 0.3 lack a share of what they hold beside the surface, the
-    water being a share `total` of it more in all."""
-    water = tank([2, 0.2, 1], 0.1, lambda x: x[:, 2] - LEVEL - 0.02)
+def corrected(lacks, total, level=LEVEL + 0.02):
+    """x (N,) [m], φ (N,) [m], correction and target [m³] of a pool whose nodes on the side x < 0.3 lack a share of what
+    they hold beside the surface, the water being a share `total` of it more in all."""
+    water = tank([2, 0.2, 1], 0.1, lambda x: x[:, 2] - level)
     t, phi = water.topology, water.level_set
     own = nodal_volume(t, phi)
     carried = own.copy()
@@ -54,6 +54,20 @@ def test_more_than_a_corrected_place_can_take_goes_to_all_of_the_surface():
     x, phi, found, target = corrected(0.3, 1e-2)
     assert found.nodal_water.sum() == pytest.approx(target, rel=2 * VOLUME_TOLERANCE)
     assert lowered(x, phi, found, lambda x: x > 1.5) == pytest.approx(5e-3, rel=0.5)
+
+
+@pytest.mark.parametrize(("lacks", "cells"), [(0.0, -0.15), (0.0, 0.25), (-0.9, -0.15), (0.9, 0.15)])
+def test_the_surface_moves_by_more_than_a_tenth_of_a_cell_where_the_total_asks_for_it(lacks, cells):
+    """In steps several cells long the correction of the nodes misses that much: of the water that breaks a wall in
+    seven cells 0.17 % was gone for a step. What the nodes hold is what lies below the surface, also where it comes to
+    cells that a shift of the usual size does not reach: at an end that was corrected as far as one step may."""
+    level = LEVEL + 0.05 + 0.005 * np.sign(cells)
+    x, phi, found, target = corrected(lacks, cells * 0.1 / level, level)
+    assert found.nodal_water.sum() == pytest.approx(target, rel=2 * VOLUME_TOLERANCE)
+    assert lowered(x, phi, found, lambda x: x > 1.5) > 0.01
+    assert lacks == 0.0 or lowered(x, phi, found, lambda x: x < 0.2) > 0.046
+    t = tank([2, 0.2, 1], 0.1, lambda x: x[:, 2] - LEVEL).topology
+    np.testing.assert_allclose(nodal_volume(t, found.level_set), found.nodal_water, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("lacks", [0.02, 0.1])
