@@ -46,7 +46,7 @@ def test_momentum_counts_at_jumps_and_in_fast_water_only():
 
 
 def test_a_thick_liquid_keeps_its_own_viscosity_however_fast_it_is():
-    """A vortex between walls that slip decays as e^(-2 π² ν t). Its liquid is far faster than the wave of a cell; the
+    """A vortex between free-slip walls decays as e^(-2 π² ν t). Its liquid is far faster than the wave of a cell; the
     momentum of fast water, of first order, made it lose a tenth more."""
     viscosity, n = 0.01, 24
     water = tank(

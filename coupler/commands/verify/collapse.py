@@ -58,14 +58,14 @@ def dam_break_front():
         yield from run.losses.findings(f"smooth walls, cells of a/{n}: ")
     for n, run in slipping.items():
         yield Finding(
-            f"walls that slip, cells of a/{n}: T at Z = 3, against a/64", run.at(3.0), SLIPPING, 0.01
+            f"free-slip walls, cells of a/{n}: T at Z = 3, against a/64", run.at(3.0), SLIPPING, 0.01
         )
     long, other = columns("martin_moyce_front_n2_2_a2p25in_fig3"), columns("koshizuka_oka_front")
     curves = (
         Curve(f"{TABLE}, table 2", "measured", table["T"], table["Z"]),
         Curve("the same, figure 3", "measured", long["T"], long["Z"]),
         Curve("Koshizuka and Oka 1996, measured", "measured", other["T"], other["Z"]),
-        *(Curve(f"walls that slip, cells a/{n}", "computed", run.T, run.Z) for n, run in slipping.items()),
+        *(Curve(f"free-slip walls, cells a/{n}", "computed", run.T, run.Z) for n, run in slipping.items()),
         *(Curve(f"smooth walls, cells a/{n}", "computed", run.T, run.Z) for n, run in rubbed.items()),
     )
     axes = ("time $t\\sqrt{2g/a}$ [–]", "front $x/a$ [–]")

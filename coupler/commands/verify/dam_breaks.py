@@ -67,9 +67,9 @@ def wall_impact():
     differs = slipping.within(at, 1) - np.interp(at, sph["tstar"], sph["pstar"])
     rms = np.sqrt(np.mean(differs**2))
     yield Finding(
-        "walls that slip: rms difference of p* to published δ-SPH, 3 < t* < 6", rms, 0.0, 0.05, False
+        "free-slip walls: rms difference of p* to published δ-SPH, 3 < t* < 6", rms, 0.0, 0.05, False
     )
-    yield from slipping.losses.findings("walls that slip: ")
+    yield from slipping.losses.findings("free-slip walls: ")
     yield _impact_figure(runs[32], slipping, table, sph)
     yield _cells_figure(runs, table)
     steps = {number: _impact(16, courant=number) for number in courant.NUMBERS if number != 1.0} | {
@@ -142,8 +142,8 @@ def _impact_figure(rubbed: Impact, slipping: Impact, table, sph) -> Figure:
         Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some]),
         Curve("measured, median", "measured", t, table["median"][some]),
         Curve("friction of smooth walls, H/32", "computed", rubbed.t, rubbed.p[:, 1]),
-        Curve("walls that slip, H/16", "computed", slipping.t, slipping.p[:, 1]),
-        Curve("δ-SPH, walls that slip, H/400", "other", sph["tstar"], sph["pstar"]),
+        Curve("free-slip walls, H/16", "computed", slipping.t, slipping.p[:, 1]),
+        Curve("δ-SPH, free-slip walls, H/400", "other", sph["tstar"], sph["pstar"]),
     )
     panels = [Panel(axes[0], f"{axes[1]}, z = 15 mm", second, (2.2, 6.6), (-0.1, 3.0))]
     for row, name, height in ((0, "lobovsky_p1_H300", "3 mm"), (2, "lobovsky_p3_H300", "30 mm")):
@@ -151,7 +151,7 @@ def _impact_figure(rubbed: Impact, slipping: Impact, table, sph) -> Figure:
         curves = (
             Curve("measured, one run", "measured", single["tstar"], single["pstar"]),
             Curve("friction of smooth walls, H/32", "computed", rubbed.t, rubbed.p[:, row]),
-            Curve("walls that slip, H/16", "computed", slipping.t, slipping.p[:, row]),
+            Curve("free-slip walls, H/16", "computed", slipping.t, slipping.p[:, row]),
         )
         panels.append(Panel(axes[0], f"{axes[1]}, z = {height}", curves, (2.2, 6.6), (-0.1, 3.0)))
     return Figure("P38_wall", tuple(panels))
