@@ -234,7 +234,7 @@ def levels():
     rms = _rms(mirrored, table, "H3")
     yield Finding(f"mirrored cells: rms difference of H3 to 2 s [m] {TOLD}", rms, 0.0, ANY, False)
     yield _box_figure("P39_levels", found, table, PROBES, until, "depth of water at {} [m]", 1.0)
-    yield Figure("P39_losses", losses.panels("cells of 5 cm, CFL 1"), columns=2)
+    yield Figure("P39_losses", (losses.panel("cells of 5 cm, CFL 1"),))
 
 
 def _impulse(time, pressure, ahead: float = 0.0) -> float:

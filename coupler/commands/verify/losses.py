@@ -20,16 +20,13 @@ class Losses:
         self.water = water
         self.moved = 0.0
         """Σ |volume moved by the last shift| [m³]: lost with its surface in one place, back in another."""
-        self.clipped = 0
-        """Node-steps at the speed limit."""
-        self.history: list[tuple[float, float, int]] = []
-        """(time [s], share moved so far, clipped so far) after each step."""
+        self.history: list[tuple[float, float]] = []
+        """(time [s], share moved so far) after each step."""
 
     def add(self) -> None:
         """Take the report of the step just made."""
         self.moved += abs(self.water.report.reinserted)
-        self.clipped += self.water.report.clipped
-        self.history.append((self.water.time, self.share_moved, self.clipped))
+        self.history.append((self.water.time, self.share_moved))
 
     @property
     def share_moved(self) -> float:
@@ -42,11 +39,11 @@ class Losses:
         yield Finding(f"{where}error of the water volume at the end", end, 0.0, MOST_ERROR, False)
         yield Finding(f"{where}sum of |re-inserted volume| / water", self.share_moved, 0.0, MOST_MOVED, False)
 
-    def panels(self, label: str) -> tuple[Panel, Panel]:
-        """Both sums over time, for a figure."""
-        t, moved, clipped = np.array(self.history).T
-        volume = Curve(label, "computed", t, 100 * moved)
-        return (
-            Panel("time [s]", "re-inserted so far [% of the water]", (volume,)),
-            Panel("time [s]", "node-steps at the speed limit", (Curve(label, "computed", t, clipped),)),
+    def panel(self, label: str) -> Panel:
+        """The share moved so far over time, for a figure."""
+        t, moved = np.array(self.history).T
+        return Panel(
+            "time [s]",
+            "moved by the last shift so far [% of the water]",
+            (Curve(label, "computed", t, 100 * moved),),
         )
