@@ -68,9 +68,8 @@ ALWAYS = {
     "shallow-water equations, which squares of 5 and of 10 cm give within 0.06 s of one another; with 5 mm of water "
     "in the channel instead of 20 mm it would be 0.2 to 0.3 s, so that clock or water are in doubt. The front "
     "is therefore judged by these equations. Cells are three times as wide as high, and hold water 0.4 of a "
-    "layer deep ahead of the wave: before the water in the face of a bore kept its momentum, the front was "
-    "0.3 to 0.5 s late, and before the gate stood at the far side of its blocks, as in the experiment, "
-    "another 0.2 to 0.3 s.",
+    "layer deep ahead of the wave. If the water in the face of the bore does not keep its momentum, the front is "
+    "0.3 to 0.5 s late.",
     "P42": "On cells of d/24 the wave is less than half a cell high, and its run-up one to two cells of water. There "
     "the run-up is chance: from 0.054 d on, noise of the level set inside the bed breaks the tongue, a fifth to "
     "a half of a cell deep, into lumps; with the beach moved by 0, 0.014 and 0.138 d it is 0.073, 0.076 and "
