@@ -22,6 +22,8 @@ CORNERS_AND_MIDDLE = ((0.0, 0.0), (-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 
 """Shares of its edges that lead from the middle of a parallelogram there and to its corners."""
 HALVINGS = 10
 """Halvings of the distance between two samples to find where the bed begins."""
+HAIR = 1e-6
+"""Share of that distance by which a point lies before what may be the bed, so that round-off does not put it beyond."""
 
 
 def level(water, xy) -> float:
@@ -147,16 +149,23 @@ def _wet_share(one, other) -> Array:
 
 def _up_to_the_bed(water, places, foot, inside, outside) -> Array:
     """Wet length (n,) [m] from the last samples in the open, at the heights inside (n,) [m], towards those beyond the
-    bed or in the seam of solids, at outside (n,) [m]; where the open ends is found by halving."""
+    bed or in the seam of solids, at outside (n,) [m]. A foot or the end of a solid, up to which all is open, is where
+    it ends; otherwise that is found by halving."""
     if len(places) == 0:
         return np.zeros(0)
-    first = inside
-    for _ in range(HALVINGS):
-        middle = 0.5 * (inside + outside)
+    first, outside = inside, np.where(outside < inside, np.maximum(outside, foot), outside)
+
+    def in_the_open(heights) -> Array:
         # together with the samples in the open: points that all lie outside the mesh would not be looked up
-        points = np.column_stack([np.tile(places, (2, 1)), np.concatenate([middle, first])])
+        points = np.column_stack([np.tile(places, (2, 1)), np.concatenate([heights, first])])
         free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set)[: len(places)])
-        free &= middle >= foot
+        return free & (heights >= foot)
+
+    ended = in_the_open(outside + HAIR * (inside - outside))
+    inside = np.where(ended, outside, inside)
+    for _ in range(0 if ended.all() else HALVINGS):
+        middle = 0.5 * (inside + outside)
+        free = ended | in_the_open(middle)
         inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
     return np.abs(0.5 * (inside + outside) - first)
 
