@@ -64,7 +64,8 @@ class Structure(StructureReadings):
     blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
     planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
     joints: one law for all touching faces, or rules by pairs and scatter
-    substep: length to use instead of the accurate one from `substep_limit`; None: that one
+    threads: of YADE's OpenMP, which the first structure of a process sets
+    substep [s]: length to use instead of the accurate one from `substep_limit`; None: that one
     ramp [s]: time over which the weight of the blocks comes on
     sleep: share of the strength of joints by which their tractions may be off while islands of blocks sleep
     (`sleep.py`), None: all blocks take all substeps
