@@ -45,8 +45,8 @@ class CoupledStepper:
     """The two sides and the state of their coupling; `step` advances both.
 
     water, structure, immersion: either side may be None (immersion only with water).
-    rtol: relative tolerance of the pressure solve · step_max [s]: longest step · clock: a context manager by the name of
-    a part, which counts its processor time (`coupler/run/clock.py`).
+    rtol: relative tolerance of the pressure solve · step_max [s]: longest step · clock: a context manager by the name
+    of a part, which counts its processor time (`coupler/run/clock.py`).
     passes: largest number of pressure solves in a step; after the first, the structure returns to the start of the step
     and takes it again as long as the defect is above `tolerance`.
     most_defect, limits: if a step exceeds a share of the first (`Defects`) or one of the others (`step_limits.py`), or
