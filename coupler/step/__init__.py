@@ -1,6 +1,7 @@
 """One coupled step (theory 3): water and structure, solved together for pressure and velocity.
 
-coupled_step                           the order of a step, its passes, and the choice of its length
+coupled_step                           the order of a step, the choice of its length, and when it is taken again
+exchange                               the exchange between pressure and structure, as often as the passes permit
 passes                                 the passes of a step and their relaxation
 immersion, cracks                      where the structure cuts the water
 pressure_with_structure                the pressure system with the blocks in it

@@ -8,9 +8,8 @@ A scene may lack either side: without water the structure runs alone, without a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
@@ -20,21 +19,18 @@ from array_types import Array
 from coupler.balance.energy import Ledger
 from coupler.balance.momentum import add_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room, pressure_to_start
-from coupler.step.observe import fastest_points, joint_counts
-from coupler.step.passes import CouplingPass, Passes
+from coupler.step.observe import fastest_points
 from coupler.step.record import StepRecord
 from coupler.step.residual import RETRIES, Defects
 from coupler.step.step_limits import Attempt, attempt_of, attempt_to_keep, volume_error
 from coupler.step.step_start import StepStart
 
 if TYPE_CHECKING:
-    import scipy.sparse as sp
-
+    from coupler.step.exchange import Exchange
     from coupler.step.immersion import Immersion
-    from coupler.step.pressure_with_structure import CoupledSolution, StructureResponse
     from fluid.pressure.projection import PressureProblem
     from fluid.step.water import Water
-    from yade_scripts.dynamics.structure import AdvanceReport, Structure
+    from yade_scripts.dynamics.structure import Structure
 
 
 BLOCK_COURANT = 0.5
@@ -83,6 +79,13 @@ class CoupledStepper:
         if structure is not None:
             self.radius = np.array([np.linalg.norm(v, axis=1).max() for v in self.structure.shape_vertices])
         self.time = 0.0
+        self.exchange = cast("Exchange", None)
+        if self.coupled:
+            from coupler.step.exchange import Exchange
+
+            self.exchange = Exchange(
+                self.water, self.structure, self.immersion, rtol=rtol, clock=clock, pause=self._pause
+            )
         self.sheared = None
         if self.coupled and self.water.viscous is not None and self.water.parameters.walls == "no-slip":
             from coupler.step.shear import ShearedBlocks
@@ -245,7 +248,7 @@ class CoupledStepper:
             self.water.set_films(*self.immersion.films())
             self.water.moved_on = self.immersion.moved_on()
         if self.water.viscous is not None:
-            self.water.body_velocity = self._padded(self.structure.velocity())
+            self.water.body_velocity = self.exchange.padded(self.structure.velocity())
         if self.sheared is not None:
             self.water.free_bodies = self.sheared.now()
 
@@ -254,9 +257,17 @@ class CoupledStepper:
         with self.clock("water"):
             problem = self.water.predict(dt)
         with self._with_place(problem):
-            found, moved, assumed = self._exchange(problem, record, start)
-        self.water.farther = dt * (self._padded(moved) - self.water.pushed_by)
-        self.water.moved_by_end = self.water.moved_on + dt * self._padded(moved)
+            found, moved, assumed = self.exchange.take(
+                problem,
+                record,
+                start,
+                now=self.time,
+                most=self.passes,
+                tolerance=self.tolerance,
+                energy=self.ledger.input_energy,
+            )
+        self.water.farther = dt * (self.exchange.padded(moved) - self.water.pushed_by)
+        self.water.moved_by_end = self.water.moved_on + dt * self.exchange.padded(moved)
         self.water.pushed_by = found.velocity
         with self.clock("water"):
             self.water.correct(found.problem, found.x, found.parting)
@@ -266,7 +277,7 @@ class CoupledStepper:
         behind = 0.5 * record.substep * float(np.sum(found.load[:n][~self.structure.fixed] * gained))
         self.ledger.give(dt * float(np.sum(given)), behind)
         record.missed_work = dt * np.sum(given - found.load[:n] * moved, axis=1)
-        self._note_loads(found.problem, record, self._padded(assumed))
+        self._note_loads(found.problem, record, self.exchange.padded(assumed))
 
     def _note_loads(self, problem: PressureProblem, record: StepRecord, velocity: Array) -> None:
         """Record the parts of the load and the energy that shear and outflow take from the water; velocity (n_bodies,
@@ -281,152 +292,9 @@ class CoupledStepper:
         self.ledger.left += report.left_energy
         self.ledger.parting += report.bound.work
 
-    def _exchange(
-        self, problem: PressureProblem, record: StepRecord, start: StepStart | None
-    ) -> tuple[CoupledSolution, Array, Array]:
-        """Solve for the pressure with the structure inside and move the structure under it, as often as the passes
-        permit; once if no block is wetted.
-
-        Returns the solution, and the mean velocities (n, 6) with which the blocks moved and were assumed to move."""
-        from coupler.step.coupling_rows import Wetting
-        from coupler.step.pressure_with_structure import (
-            corrected_free_velocity,
-            defect,
-            solve_coupled,
-            start_of_water,
-        )
-        from fluid.numerics.bounded import solve_bounded
-
-        structure, solve = self.structure, partial(solve_bounded, kept=[])
-        with self.clock("structure in pressure"):
-            problem, afloat = self._afloat(problem)
-            mass, response, v_free = self._response(problem, afloat)
-            wetting = Wetting.of(problem.coupling)
-        record.wetted = problem.coupling.nnz > 0
-        before, free = self._padded(structure.velocity()), ~structure.still
-        found, water_from = None, before
-        whole = self._joints_broken()
-        passes = Passes(self.passes if record.wetted else 1, self.tolerance)
-        while not passes.done:
-            self._pause()
-            with self.clock("pressure"):
-                found = solve_coupled(problem, response, v_free, solve, self.rtol, found, wetting)
-            report = self._advance(problem.dt, found, start if passes.number > 0 else None)
-            record.iterations += found.iterations
-            record.substeps += report.substeps
-            lead = response.lead(found.velocity, water_from, report.dt_s)
-            assumed = (found.velocity - lead)[: structure.n]
-            if record.wetted:
-                floor = self._defect_floor(found.load, problem.dt, free)
-                record.defect = defect(mass, assumed, report.mean_velocity, floor)
-            breaks = self._joints_broken() != whole
-            passes.add(
-                CouplingPass(solution=found, assumed=assumed, defect=record.defect, breaks_joints=breaks)
-            )
-            if not passes.done:
-                moved = passes.next_start(self._padded(assumed), self._padded(report.mean_velocity))
-                response = self._answer(mass, problem.dt, before, afloat)
-                water_from = start_of_water(response.mass, before, self.water.pushed_by, moved)
-                after = response.at_end(moved, water_from, report.dt_s)
-                v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
-        record.passes = passes.number
-        assert found is not None  # there is one pass at least
-        instead = passes.replacement()
-        if instead is not None:
-            found, assumed, record.defect = instead.solution, instead.assumed, instead.defect
-            report = self._advance(problem.dt, found, start)
-            record.substeps += report.substeps
-        record.substep, record.opening_rate = report.dt_s, report.opening_rate
-        record.impulses = report.impulses
-        return found, report.mean_velocity, assumed
-
-    def _defect_floor(self, load: Array, dt: float, free: Array) -> float:
-        """`defect_floor` of the blocks that water touches, under its load (n_bodies, 6) and their weight over dt [s].
-
-        free (n,) bool: blocks that could move at the start of the step. Blocks that fall asleep in it count as well:
-        the pressure solve assumed that they answer to the load."""
-        from coupler.step.pressure_with_structure import defect_floor, impulse_energy
-
-        structure, load = self.structure, load[: self.structure.n]
-        touched = free & load.any(axis=1)
-        mass, inertia = structure.mass[touched], structure.inertia()[touched]
-        forces = load[touched], structure.weight_now()[touched]
-        impulse = sum(impulse_energy(mass, inertia, force, dt) for force in forces)
-        return defect_floor(impulse, self.ledger.input_energy)
-
-    def _joints_broken(self) -> int:
-        return 0 if self.structure.joints is None else joint_counts(self.structure).broken
-
-    def _advance(self, dt: float, found: CoupledSolution, start: StepStart | None) -> AdvanceReport:
-        """Advance the structure by dt [s] under the load of a solution; start: the state to which it returns before."""
-        with self.clock("structure"):
-            if start is not None and start.structure is not None:
-                self.structure.restore(start.structure)
-            self.structure.set_load(found.load[: self.structure.n])
-            return self.structure.advance(dt)
-
     def _pause(self) -> None:
         if self.pause is not None:
             self.pause()
-
-    def _response(
-        self, problem: PressureProblem, afloat: Array | None
-    ) -> tuple[sp.csr_array, StructureResponse, Array]:
-        """Mass of the blocks, the response of all bodies to forces, and V_free of the first pass."""
-        from coupler.step.pressure_with_structure import mass_matrix
-
-        structure = self.structure
-        mass = mass_matrix(structure.mass, structure.inertia())
-        velocity = self._padded(structure.velocity())
-        response = self._answer(mass, problem.dt, velocity, afloat)
-        known = problem.load(0.0)
-        force = structure.weight_now() + structure.internal_force()
-        return mass, response, response.free_velocity(velocity, self._padded(force) + known)
-
-    def _answer(
-        self, mass: sp.csr_array, dt: float, driven_velocity: Array, afloat: Array | None
-    ) -> StructureResponse:
-        """The response of all bodies to forces, with the springs of the present joints and contacts."""
-        from coupler.step.pressure_with_structure import StructureResponse
-
-        structure = self.structure
-        of_bodies, stiffness, damping = self._with_solids(mass, *structure.tangent())
-        driven_velocity, driven_lead = self._prescribed(driven_velocity, dt)
-        return StructureResponse(
-            mass=of_bodies,
-            stiffness=stiffness,
-            damping=damping,
-            dt=dt,
-            driven=np.append(structure.still, np.ones(self.immersion.n_solids, bool)),
-            driven_velocity=driven_velocity,
-            driven_lead=driven_lead,
-            afloat=afloat,
-            substep=0.0 if afloat is None else dt / structure.count_substeps(dt),
-        )
-
-    def _prescribed(self, velocity: Array, dt: float) -> tuple[Array, Array | None]:
-        """velocity (n, 6) with that at the end of the step for blocks that are told a motion over time, and how much
-        more (n, 6) that is than their mean over the step; None where no block is."""
-        if not self.structure.prescribed:
-            return velocity, None
-        velocity, lead = velocity.copy(), np.zeros_like(velocity)
-        for row, motion in self.structure.prescribed.items():
-            velocity[row, :3] = motion.velocity(self.time + dt)
-            lead[row, :3] = velocity[row, :3] - motion.mean_velocity(self.time, dt)
-        return velocity, lead
-
-    def _afloat(self, problem: PressureProblem) -> tuple[PressureProblem, Array | None]:
-        """The problem with the bodies at their present positions instead of those where the cells were cut, and the
-        hydrostatic stiffness (n, 3, 3) of the free bodies that the surface cuts; None if there are none."""
-        from fluid.pressure.waterline import hydrostatic_stiffness
-
-        driven = np.append(self.structure.still, np.ones(self.immersion.n_solids, bool))
-        stiffness = hydrostatic_stiffness(self.water, problem.predicted.level_set, ~driven)
-        if stiffness is None:
-            return problem, None
-        load = problem.other_load.copy()
-        load[:, 2:5] -= np.einsum("nij,nj->ni", stiffness, self.water.moved_on[:, 2:5])
-        return replace(problem, other_load=load), stiffness
 
     def _water_step(self, dt: float, record: StepRecord) -> None:
         from fluid.numerics.bounded import solve_pressure
@@ -450,20 +318,6 @@ class CoupledStepper:
         record.substeps += report.substeps
         record.substep = report.dt_s
         record.opening_rate, record.impulses = report.opening_rate, report.impulses
-
-    def _padded(self, values: Array) -> Array:
-        """Rows of zeros appended for the fixed solids: (n, 6) → (n + m, 6)."""
-        return np.concatenate([values, np.zeros((self.immersion.n_solids, 6))])
-
-    def _with_solids(self, *matrices: sp.csr_array) -> Sequence[sp.csr_array]:
-        """Sparse (6n, 6n) matrices with empty rows for the fixed solids."""
-        import scipy.sparse as sp
-
-        size = 6 * self.immersion.n_solids
-        if size == 0:
-            return matrices
-        empty = sp.csr_array((size, size))
-        return tuple(sp.block_diag([m, empty], format="csr") for m in matrices)
 
     def _water_energy(self) -> tuple[float, float] | None:
         if self.water is None:

@@ -12,6 +12,7 @@ from coupler.balance.momentum import add_step, momentum_ledger
 from coupler.scene.build import build
 from coupler.step import coupled_step as loop
 from coupler.step.coupled_step import CoupledStepper
+from coupler.step.exchange import Exchange
 from coupler.step.limits import HIGHEST_PRESSURE, Diverged, Limits
 from coupler.step.residual import MISSES, RETRIES, SHORTEST, Defects
 from coupler.step.step_limits import Attempt, check_step
@@ -19,7 +20,7 @@ from fluid.numerics.solve import NotConverged
 from tests.fakes import FreeBody, no_clock, piston_column
 from tests.physics.scenes import case
 
-AFLOAT = CoupledStepper._afloat
+AFLOAT = Exchange._afloat
 
 
 class Pipe:
@@ -108,7 +109,7 @@ def _no_books_of_momentum(monkeypatch):
     """The pipe has no nodes to sum over, and no surface on the piston."""
     monkeypatch.setattr(loop, "momentum_ledger", lambda water, structure: None)
     monkeypatch.setattr(loop, "add_step", lambda *given: None)
-    monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
+    monkeypatch.setattr(Exchange, "_afloat", lambda self, problem: (problem, None))
 
 
 def coupling(pipe, piston, step_max=0.1, **more):
@@ -316,7 +317,7 @@ def test_a_step_taken_again_is_the_short_step_bit_for_bit(sections, monkeypatch)
     """Nothing of the step that was taken back is left in water, sea, structure and books, with and without blocks."""
     monkeypatch.setattr(loop, "momentum_ledger", momentum_ledger)
     monkeypatch.setattr(loop, "add_step", add_step)
-    monkeypatch.setattr(CoupledStepper, "_afloat", AFLOAT)
+    monkeypatch.setattr(Exchange, "_afloat", AFLOAT)
     again, straight = (after_steps(splash(**sections), good) for good in ([False, True], [True]))
     assert all(np.array_equal(a, b) for a, b in zip(again, straight))
 

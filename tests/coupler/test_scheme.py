@@ -8,8 +8,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler.step import pressure_with_structure
-from coupler.step.coupled_step import CoupledStepper
+from coupler.step import exchange
 from coupler.step.coupling_rows import Wetting
 from coupler.step.pressure_with_structure import (
     StructureResponse,
@@ -170,17 +169,16 @@ def test_the_motion_that_counts_as_none_goes_by_the_load_or_by_the_scene():
 def test_the_floor_of_a_step_counts_load_and_weight_of_free_blocks_that_water_touches():
     """Of three blocks of 2 kg one is held and one is dry: 0.1 s of 30 N of water and of 20 N of weight, (3² + 2²)/4 J,
     and nothing of the others."""
-    stepper = object.__new__(CoupledStepper)
     weight = np.zeros((3, 6))
     weight[:, 2] = -20.0
-    stepper.structure = SimpleNamespace(
+    structure = SimpleNamespace(
         n=3, mass=np.full(3, 2.0), inertia=lambda: np.tile(np.eye(3), (3, 1, 1)), weight_now=lambda: weight
     )
-    stepper.ledger = SimpleNamespace(input_energy=1e9)
+    between = exchange.Exchange(None, structure, None, rtol=1e-8, clock=no_clock, pause=lambda: None)
     load = np.zeros((4, 6))  # of a fixed solid, too
     load[[0, 1, 3], 0] = 30.0
     free = np.array([True, False, True])
-    assert stepper._defect_floor(load, 0.1, free) == pytest.approx((3.0**2 + 2.0**2) / 4.0)
+    assert between._defect_floor(load, 0.1, free, 1e9) == pytest.approx((3.0**2 + 2.0**2) / 4.0)
 
 
 def test_round_off_of_a_scene_at_rest_is_no_defect():
@@ -371,29 +369,24 @@ def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
             problem=problem,
         )  # fmt: skip
 
-    monkeypatch.setattr(pressure_with_structure, "solve_coupled", solution)
-    monkeypatch.setattr(
-        pressure_with_structure, "corrected_free_velocity", lambda r, after, x, c: after.ravel()
-    )
+    monkeypatch.setattr(exchange, "solve_coupled", solution)
+    monkeypatch.setattr(exchange, "corrected_free_velocity", lambda r, after, x, c: after.ravel())
     monkeypatch.setattr("coupler.step.coupling_rows.Wetting.of", lambda coupling: None)
-    stepper = object.__new__(CoupledStepper)
-    stepper.structure, stepper.immersion = gate, SimpleNamespace(n_solids=0)
-    stepper.water = SimpleNamespace(pushed_by=np.zeros((1, 6)))
-    stepper.passes, stepper.tolerance, stepper.pause, stepper.rtol = 2, 0.02, None, 1e-8
-    stepper.clock, stepper.ledger = no_clock, SimpleNamespace(input_energy=sea)
+    water, solids = SimpleNamespace(pushed_by=np.zeros((1, 6))), SimpleNamespace(n_solids=0)
+    between = exchange.Exchange(water, gate, solids, rtol=1e-8, clock=no_clock, pause=lambda: None)
     response = SimpleNamespace(
         lead=lambda velocity, before, substep: np.zeros((1, 6)),
         at_end=lambda mean, before, substep: mean,
         mass=sp.eye_array(6).tocsr(),
     )
-    monkeypatch.setattr(
-        CoupledStepper, "_response", lambda *_: (sp.eye_array(6).tocsr(), response, np.zeros(6))
-    )
-    monkeypatch.setattr(CoupledStepper, "_answer", lambda *_: response)
-    monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
+    first = sp.eye_array(6).tocsr(), response, np.zeros(6)
+    monkeypatch.setattr(between, "_response", lambda *_: first)
+    monkeypatch.setattr(between, "_answer", lambda *_: response)
+    monkeypatch.setattr(between, "_afloat", lambda problem: (problem, None))
     problem = SimpleNamespace(dt=dt, coupling=sp.csr_matrix(np.ones((1, 6))))
     record = StepRecord(time=0.0, dt=dt)
-    found, moved, _ = stepper._exchange(problem, record, SimpleNamespace(structure=False))
+    start = SimpleNamespace(structure=False)
+    found, moved, _ = between.take(problem, record, start, now=0.0, most=2, tolerance=0.02, energy=sea)
     assert gate.broken == broken
     assert record.passes <= 4
     if broken:
