@@ -29,6 +29,8 @@ ROWS_OF_CELLS = ("_nodal_water", "_wet_fraction", "_cell_velocity", "_inflow", "
 """Kernels that go over cells; the others go over nodes."""
 SUMS = ("_hat_forces", "_momenta", "_squares_of")
 """Kernels whose range is one of chunks."""
+WHOLE = ("_product", "_stepped", "_dots", "_powers", "_counted_water")
+"""Kernels whose range is one of chunks of arrays that they go through from end to end."""
 
 
 def amdahl(serial: float, n: int) -> float:
@@ -179,6 +181,8 @@ def _bytes(name: str, args, nodes: int, cells: int, read=()) -> float:
     """Bytes of the arrays among the arguments, of those of the whole mesh the share that the rows are of it; read:
     names that the kernel uses, by which it takes what it reads out of a bundle of arrays."""
     arrays = [a for arg in args for a in _arrays(arg, read)]
+    if name in WHOLE:
+        return float(sum(a.nbytes for a in arrays))
     rows = _rows(name, args)
     whole = cells if name in ROWS_OF_CELLS else nodes
     share = min(1.0, rows / whole)
