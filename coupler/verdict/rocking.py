@@ -26,13 +26,26 @@ def rocking(structure: Structure, out: Array, reach: Array) -> Array:
     found, out = np.zeros(structure.n, bool), out & ~structure.fixed
     if not out.any():
         return found
-    up = _up(structure)
-    centre, rotation = structure.centre(), structure.rotation()
-    label = _pieces(structure)
-    for piece in np.unique(label[out]):
+    up, centre, label = _up(structure), structure.centre(), _pieces(structure)
+    way, rises = _ways(structure, centre, label, up)
+    for piece in np.flatnonzero(rises & (np.bincount(label[out], minlength=len(rises)) > 0)).tolist():
         rows = np.flatnonzero((label == piece) & ~structure.fixed)
-        found[rows] = out[rows] & _turns_back(structure, rows, reach, (centre, rotation), up)
+        placed = centre, structure.rotation()
+        found[rows] = out[rows] & _turns_back(structure, rows, reach, placed, way[piece], up)
     return found
+
+
+def _ways(structure: Structure, centre: Array, label: Array, up: Array) -> tuple[Array, Array]:
+    """Way (pieces, 3) [m] of the centre of mass of each piece, from centre (n, 3) [m] and label (n,), and whether it
+    has risen (pieces,) bool: most pieces of a building that has come down have not, and need no further look."""
+    start = np.array([block.centre for block in structure.blocks]).reshape(-1, 3)
+    mass = np.where(structure.fixed, 0.0, structure.mass)
+    moved = (mass[:, None] * (centre - start)).T
+    whole = np.bincount(label, mass)
+    way = (
+        np.stack([np.bincount(label, m) for m in moved], axis=1) / np.where(whole > 0.0, whole, 1.0)[:, None]
+    )
+    return way, way @ up > 0.0
 
 
 def _up(structure: Structure) -> Array:
@@ -59,19 +72,18 @@ def _pieces(structure: Structure) -> Array:
 
 
 def _turns_back(
-    structure: Structure, rows: Array, reach: Array, placed: tuple[Array, Array], up: Array
+    structure: Structure, rows: Array, reach: Array, placed: tuple[Array, Array], way: Array, up: Array
 ) -> bool:
     """Whether a corner of the base of the piece `rows` is in its place, and its centre of mass, which has risen, before
-    the last of those."""
+    the last of those. placed: centres and rotations of all blocks · way (3,) [m] of its centre of mass."""
     centre, rotation = placed
-    blocks = [structure.blocks[i] for i in rows]
-    start = np.array([block.centre for block in blocks])
-    mass = structure.mass[rows]
-    mean, way = mass @ centre[rows] / mass.sum(), mass @ (centre[rows] - start) / mass.sum()
     along = way - (way @ up) * up
     size = float(np.linalg.norm(along))
-    if size == 0.0 or not way @ up > 0.0:
+    if size == 0.0:
         return False
+    blocks = [structure.blocks[i] for i in rows]
+    mass = structure.mass[rows]
+    mean = mass @ centre[rows] / mass.sum()
     corners = [block.world_vertices() for block in blocks]
     now = [centre[i] + np.asarray(b.vertices) @ rotation[i].T for i, b in zip(rows, blocks)]
     least = min(float((x @ up).min()) for x in corners)

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -215,3 +216,21 @@ def test_a_nan_among_the_figures_does_not_hide_why_the_run_ended(tmp_path):
         "b": [1.0, None],
         "c": 2.0,
     }
+
+
+def test_what_is_written_as_json_is_what_the_standard_library_writes(tmp_path):
+    """Line by line with one blank a level, so that a summary can be read and compared by lines."""
+    content = {
+        "text": 'a "quoted" path\\ and a line\nwith ü and \x07',
+        "numbers": [0, -3, True, False, None, 1.5, 1e-300, 12345678901234567890],
+        "empty": [{}, [], ()],
+        "nested": {"list": [[1, 2], {"a": {"b": "c"}}]},
+    }
+    write_json(
+        tmp_path / "a.json", content | {"array": np.array([[1.0, np.nan]]), "path": Path("x"), 3: "key"}
+    )
+    expected = content | {"array": [[1.0, None]], "path": "x", "3": "key"}
+    text = json.dumps(expected, indent=1, ensure_ascii=False)
+    assert (tmp_path / "a.json").read_text(encoding="utf-8") == text + "\n"
+    with pytest.raises(TypeError, match="set has no form in JSON"):
+        write_json(tmp_path / "b.json", {"a": {1}})
