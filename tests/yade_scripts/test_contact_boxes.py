@@ -1,4 +1,5 @@
-"""Boxes are kept apart by their half edges: the same bits as by their vertices and faces, and no contact is missed."""
+"""Boxes are kept apart by their half edges: the same bits as by their vertices and faces, and no contact is missed. Nor
+is one missed among the nodes that are far from the faces of the other block."""
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.nodes import contact_shapes
 from yade_scripts.contact.search import planes_seen_from, separation
 from yade_scripts.dynamics.structure import Structure
+from yade_scripts.yade_side import scene
 
 
 @kernel
@@ -63,11 +65,20 @@ def heap(seed):
     return [b.changed(velocity=random.normal(size=3), spin=random.normal(size=3)) for b in blocks]
 
 
-def fallen(seed, monkeypatch, plain):
-    """State of the heap after 0.9 s, and how many contacts there are."""
+def fallen(seed, monkeypatch, plain=False, all_nodes=False):
+    """State of the heap after 0.9 s, and how many contacts there are. all_nodes: those near faces are listed anew in
+    every substep."""
+    add_forces = forces.ContactForces.add_forces
+
+    def of_all_nodes(self, dt, F):
+        self._pairs.left[:] = 0.0
+        add_forces(self, dt, F)
+
     with monkeypatch.context() as patch:
         if plain:
             patch.setattr(forces, "contact_shapes", plain_shapes)
+        if all_nodes:
+            patch.setattr(forces.ContactForces, "add_forces", of_all_nodes)
         with Structure(heap(seed), ContactLaw(1e7, 0.3, 0.5), ground=0.0) as s:
             for _ in range(9):
                 s.advance(0.1)
@@ -77,12 +88,26 @@ def fallen(seed, monkeypatch, plain):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_heap_falls_with_the_same_bits_as_by_vertices_and_wide_margins(seed, monkeypatch):
     """Pairs that are passed by because they are clear of one another have no contact."""
-    now, count = fallen(seed, monkeypatch, False)
-    before, _ = fallen(seed, monkeypatch, True)
+    now, count = fallen(seed, monkeypatch)
+    before, _ = fallen(seed, monkeypatch, plain=True)
     assert count > 10
+    assert_same(now, before)
+
+
+def assert_same(now, before):
     assert (now.motion == before.motion).all()
     for name, values in now.contacts.items():
         assert (values == before.contacts[name]).all(), name
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nodes_that_are_passed_by_come_into_no_contact(seed, monkeypatch):
+    """Between two lists of the nodes near the faces of another block no other node gets there, however far blocks go
+    until their neighbours are sought, when the lists are made anew too."""
+    monkeypatch.setattr(scene, "VERLET", 1.0)
+    now, count = fallen(seed, monkeypatch)
+    assert count > 10
+    assert_same(now, fallen(seed, monkeypatch, all_nodes=True)[0])
 
 
 @settings(max_examples=30, deadline=None)

@@ -10,6 +10,8 @@ from array_types import Array
 
 BEGINS = -1.0
 """In place of the last normal force of a contact that has not pushed yet."""
+ROOM = 31
+"""Nodes of a block that a pair can list as near the faces of the other, of up to 256 that it has."""
 CROSSINGS = 4
 """Edges of a block that may cross edges of another at a time: the corners of beams that lie on one another."""
 
@@ -83,7 +85,9 @@ class Pairs(NamedTuple):
     touching (p,) bool: the pair had contacts at the last evaluation · calm (p,) [m]: relative motion below which the
     two cannot touch or, where they touch, below which the outermost edges need not be sought again · overlap (p,) [m]:
     smallest displacement that separates them, zero if they are apart · found (p,) bool: the contacts at the present
-    positions are known. Contacts begin and end once for each position, however often they are evaluated there.
+    positions are known. Contacts begin and end once for each position, however often they are evaluated there ·
+    near (p, 2, 1 + ROOM) bytes: how many nodes of a, and of b, may come into contact before the two have moved by
+    left (p,) [m] against each other, and which, counted from the first node of the block; more than ROOM: not known.
     """
 
     a: Array
@@ -95,6 +99,8 @@ class Pairs(NamedTuple):
     calm: Array
     overlap: Array
     found: Array
+    near: Array
+    left: Array
 
 
 class Parted(NamedTuple):

@@ -10,7 +10,17 @@ from array_types import Array
 from kernels.ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
-from yade_scripts.contact.arrays import CROSSINGS, Bodies, Kinematics, Law, Pairs, Parted, Slots, empty_rows
+from yade_scripts.contact.arrays import (
+    CROSSINGS,
+    ROOM,
+    Bodies,
+    Kinematics,
+    Law,
+    Pairs,
+    Parted,
+    Slots,
+    empty_rows,
+)
 from yade_scripts.contact.ground import NO_GROUND, GroundSurface
 from yade_scripts.contact.kernel import carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
@@ -223,7 +233,8 @@ class ContactForces:
                 now[known] = old[spot]
         if as_deep:
             force[~known] = np.inf
-        self._pairs = Pairs(a, b, start, force, held, touching, calm, overlap, found)
+        near, left = np.empty((len(a), 2, 1 + ROOM), np.uint8), np.zeros(len(a))
+        self._pairs = Pairs(a, b, start, force, held, touching, calm, overlap, found, near, left)
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.decorators import inner, kernel, released
-from yade_scripts.contact.arrays import CROSSINGS, Direction, Faces
+from yade_scripts.contact.arrays import CROSSINGS, ROOM, Direction, Faces
 from yade_scripts.contact.boxes import CLEAR, between_boxes, planes_of_box
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
@@ -24,6 +24,7 @@ from yade_scripts.contact.search import (
     planes_seen_from,
     scan,
     separation,
+    sweeping_bound,
 )
 from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots, take_over
 
@@ -34,6 +35,9 @@ STEADY = 0.1
 """Relative motion, in margins of the thinner block, within which the edges found last are taken to be the outermost
 still. Each change of edges leaves at most about that overlap without force: blocks that roll and slide on their edges
 would otherwise sink a little at each."""
+REACH = 0.1
+"""Relative motion, in radii of the smaller block, before which the nodes near the faces of the other are not sought
+again: much more than blocks move in a substep, and less than most nodes are away from faces that they do not touch."""
 BEYOND = 1.0 + 1e-6
 """Factor on a distance within which contact is looked for, for rounding."""
 SAME = 1.0 + 1e-6
@@ -81,7 +85,14 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
         if finds and pairs.calm[p] > 0.0:
             pairs.calm[p] -= state.last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
             if pairs.calm[p] > 0.0 and not pairs.touching[p]:
+                pairs.left[p] = 0.0  # no longer counted
                 continue
+        reach = 0.0
+        if finds:
+            pairs.left[p] -= state.last_dt * sweeping_bound(v, a, b, shapes.radius[a], shapes.radius[b])
+            if pairs.left[p] <= 0.0:
+                pairs.left[p] = reach = REACH * min(shapes.radius[a], shapes.radius[b])
+                pairs.near[p, 0, 0] = pairs.near[p, 1, 0] = ROOM + 1
         whole = pairs.force[p] > 0.0
         first, apart, forward = count, -np.inf, Direction(a, b, finds, whole)
         if b == ground.row:
@@ -115,7 +126,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
                 count, taken = scan(
                     shapes, bodies, law, slots, slot, Direction(node_body, face_body, finds, whole),
-                    Faces(planes, faces, farthest, margin), state, rows, count, taken, scratch,
+                    Faces(planes, faces, farthest, margin), pairs, p, reach, state, rows, count, taken, scratch,
                 )  # fmt: skip
         base, nodes = pairs.start[p + 1] - CROSSINGS, count
         known = False

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.decorators import inlined, inner, plain
-from yade_scripts.contact.arrays import BEGINS, CROSSINGS
+from yade_scripts.contact.arrays import BEGINS, CROSSINGS, ROOM
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.overlap import share_of_overlap
 from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, way_of
@@ -40,6 +40,21 @@ def closing_bound(v, a, b, radius_a, radius_b):
         turn_b += v[b, 3 + k] ** 2
     speed = np.sqrt(linear) + np.sqrt(turn_a) * radius_a
     return speed + np.sqrt(turn_b) * radius_b if turn_b > 0.0 else speed
+
+
+@inner
+def sweeping_bound(v, a, b, radius_a, radius_b):
+    """Upper bound [m/s] of the speed of points of either of two blocks that are not apart against the planes of faces
+    of the other, seen at most as far from its centre as the points are; planes have radius inf and rest."""
+    linear = turn_a = turn_b = 0.0
+    for k in range(3):
+        linear += (v[a, k] - v[b, k]) ** 2
+        turn_a += v[a, 3 + k] ** 2
+        turn_b += v[b, 3 + k] ** 2
+    speed, turn_a = np.sqrt(linear), np.sqrt(turn_a)
+    if radius_b == np.inf:
+        return speed + turn_a * radius_a
+    return speed + turn_a * (radius_a + 2.0 * radius_b) + np.sqrt(turn_b) * (radius_b + 2.0 * radius_a)
 
 
 @plain
@@ -88,15 +103,21 @@ def separation(node, begin, end, planes, faces):
 
 
 @inlined
-def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost, scratch):
+def scan(shapes, bodies, law, slots, slot, side, faces, pairs, p, reach, state, rows, count, lost, scratch):
     """Contacts of the nodes of a with the faces of b, which `slots` remembers from `slot` on; the energy of springs
     whose contacts end is added to `lost`. → (contacts, lost [J])
 
-    Most nodes lie outside of the face `farthest`, which is therefore looked at first."""
+    Most nodes lie outside of the face `farthest`, which is therefore looked at first. The pair p lists nodes that may
+    come into contact, and the others are passed by · reach [m]: the list is made anew of those that may before the
+    bodies have moved so far against each other, 0: it is not."""
     a, b, planes, margin = side.a, side.b, faces.planes, faces.margin
     begin, base, way = shapes.node_start[a], shapes.face_number[b], scratch[6:8]
-    for i in range(begin, shapes.node_end[a]):
-        s = np.uint32(slot + i - begin)
+    d = 0 if a == pairs.a[p] else 1
+    listed, kept = reach == 0.0 and pairs.left[p] > 0.0 and pairs.near[p, d, 0] <= ROOM, 0
+    visits = np.int64(pairs.near[p, d, 0]) if listed else shapes.node_end[a] - begin
+    for visit in range(visits):
+        number = np.int64(pairs.near[p, d, 1 + visit]) if listed else visit
+        i, s = begin + number, np.uint32(slot + number)
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
         nearest = faces.farthest
         smallest = _behind(planes, nearest, xi0, xi1, xi2)
@@ -106,6 +127,10 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
             depth = _behind(planes, g, xi0, xi1, xi2)
             if depth < smallest:
                 smallest, nearest = depth, g
+        if reach > 0.0 and smallest > -margin - reach:
+            if kept < ROOM and number < 256:
+                pairs.near[p, d, 1 + kept] = number
+            kept += 1 if number < 256 else ROOM + 1
         g = slots.face[s] - base if slots.face[s] >= 0 else -1
         if g >= 0:
             depth = _behind(planes, g, xi0, xi1, xi2)
@@ -136,6 +161,8 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
         write_row(rows, count, side, s, planes[g], depth, xi0, xi1, xi2, state)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
         count += 1
+    if reach > 0.0:
+        pairs.near[p, d, 0] = min(kept, ROOM + 1)
     return count, lost
 
 
