@@ -97,8 +97,10 @@ class Water:
         """Point (3,) [m] that angular momentum is taken about."""
         self._lowest = float((mesh.bounds * self.parameters.weight).max(axis=0).sum())
         """g·x at the floor [m²/s²]."""
-        no_slip = self.parameters.walls == "no-slip"
-        self._sides = Walls.of(mesh, is_open, is_smooth, no_slip, sides)
+        walls = self.parameters.walls
+        self._sides = Walls.of(
+            mesh, is_open, _everywhere if walls == "slip" else is_smooth, walls == "no-slip", sides
+        )
         self._on_sides = np.zeros(len(mesh.nodes), bool)
         self._on_sides[mesh.boundary_faces] = True
         self.viscous = _viscosity(self.parameters)
@@ -586,3 +588,8 @@ def _viscosity(parameters: WaterParameters):
     from fluid.viscous.viscosity import Viscosity
 
     return Viscosity(parameters)
+
+
+def _everywhere(normal: Array, centre: Array) -> Array:
+    """(B,) bool: all of the faces, with normals and centres (B, 3)."""
+    return np.ones(len(centre), bool)
