@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fluid.domain.hats import POLYGON, hats_at
+from fluid.numerics.fields import accumulate
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import over
 
@@ -36,7 +37,7 @@ def rows_of(coupling, rows) -> sp.csr_matrix:
     """The listed rows (n,) of a csr matrix, in their order."""
     start = np.zeros(len(rows) + 1, coupling.indptr.dtype)
     over(_lengths, len(rows), rows, coupling.indptr, start[1:])
-    np.cumsum(start, out=start)
+    accumulate(start)
     column, entry = np.empty(start[-1], coupling.indices.dtype), np.empty(start[-1])
     given = (coupling.indptr, coupling.indices, coupling.data)
     over(_copy_rows, len(rows), rows, given, (start, column, entry))

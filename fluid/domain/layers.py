@@ -41,12 +41,14 @@ def layers_around(seed, depth: int, start, around, among=None) -> Layers:
     start, around: `Topology.around` · among (N,) bool: the nodes that layers may hold, None: all."""
     place, layer_start = np.empty(len(seed), np.int32), np.zeros(depth + 2, np.int64)
     over(_nowhere, len(seed), _ANY if among is None else among, place)
-    order, found, count = np.empty(len(seed), np.int64), marked(seed), 0
-    for layer in range(depth + 1):
-        if layer > 0:
-            before = order[layer_start[layer - 1] : count]
-            rows = (layer_start[layer - 1], before, place, start, around)
-            found = found_over(_beyond, len(before), *rows, weight=WORK, pieces=1)
+    seeds, order = marked(seed), np.empty(len(seed), np.int64)
+    seeds = found_over(_with_neighbours, len(seeds), seeds, start, place)
+    layer_start[1] = count = len(seeds)
+    over(_put_first, count, seeds, order, place)
+    for layer in range(1, depth + 1):
+        before = order[layer_start[layer - 1] : count]
+        rows = (layer_start[layer - 1], before, place, start, around)
+        found = found_over(_beyond, len(before), *rows, weight=WORK, pieces=1)
         count = _append(found, start, count, order, place)
         layer_start[layer + 1] = count
     return Layers(order[:count].copy(), layer_start, place)
@@ -57,6 +59,24 @@ def _nowhere(first, last, among, place):
     for j in range(first, last):
         i = np.uint64(j)
         place[i] = -1 if among.shape[0] == 0 or among[i] else BARRED
+
+
+@released
+def _with_neighbours(first, last, seeds, start, place):
+    """Those of the listed nodes that have neighbours and may stand in layers, in order."""
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
+        i = np.uint64(seeds[s])
+        if place[i] < 0 and start[i + np.uint64(1)] > start[i]:
+            found[n] = seeds[s]
+            n += 1
+    return found[:n].copy()
+
+
+@ranged
+def _put_first(first, last, seeds, order, place):
+    for s in range(first, last):
+        order[s], place[seeds[s]] = seeds[s], s
 
 
 @plain

@@ -98,8 +98,9 @@ def solve_bounded(
     apply, precondition = operators(A, extra, kept)
     x, signs, iterations, reach = np.array(x0, float), _Signs(lower), 0, 0
     for rounds in range(1, MOST_ROUNDS + 1):
-        x[held] = lower[held]
-        free = None if not held.any() else held
+        free = held if held.any() else None
+        if free is not None:
+            x[held] = lower[held]
         found = conjugate_gradients(
             apply,
             precondition,
@@ -142,25 +143,34 @@ def solve_bounded(
 
 def solve_pressure(problem, rtol: float, moved=0.0) -> BoundedResult:
     """The pressure of a `projection.PressureProblem` whose bodies have a given motion: moved (n,) [m³/s], their G V."""
+    rhs = problem.rhs if np.ndim(moved) == 0 and moved == 0.0 else problem.rhs + moved
     return solve_bounded(
-        problem.matrix, problem.rhs + moved, problem.guess, rtol, problem.lower, problem.at_bound, problem.air
+        problem.matrix, rhs, problem.guess, rtol, problem.lower, problem.at_bound, problem.air
     )
-
-
-def at_air(x, air):
-    """(n,) bool: where x is at the bound of air within the slack of the solver, so that round-off above it does not
-    decide where air advances."""
-    return x <= air + SLACK * _largest(x)
 
 
 def _air_goes_on(A, x, lower, air):
     """(n,) bool: unknowns below the bound of air that air has not reached, next to those where it separates the
     water."""
-    near = at_air(x, air)
-    source, below = near & (lower == air), near & (lower < air)
-    if not source.any() or not below.any():
+    source, below = np.empty(len(x), bool), np.empty(len(x), bool)
+    counts = over(_beside_air, len(x), x, lower, air, SLACK * _largest(x), source, below)
+    if any(not any(count) for count in zip(*counts)):
         return None
     return below & _beside(A.indptr, A.indices, source)
+
+
+@ranged
+def _beside_air(first, last, x, lower, air, slack, source, below):
+    """Mark where x (n,) is at the bound of air within the slack of the solver, so that round-off above it does not
+    decide where air advances: where that is its own bound, and where its own lies below; how many of both."""
+    n_source, n_below = 0, 0
+    for j in range(first, last):
+        i = np.uint64(j)
+        near = x[i] <= air[i] + slack
+        source[i], below[i] = near and lower[i] == air[i], near and lower[i] < air[i]
+        n_source += source[i]
+        n_below += below[i]
+    return n_source, n_below
 
 
 @kernel

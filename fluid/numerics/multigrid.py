@@ -244,10 +244,10 @@ def _matched(start, middle, column, entry, diagonal):
         if pair[i] >= 0 or start[i + 1] == start[i]:
             continue
         strongest, partner = 0.0, -1
-        for s in range(start[i], start[i + 1]):
+        for s in range(middle[i], start[i + 1]):
             if pair[column[s]] < 0:
                 strongest = max(strongest, -entry[s])
-        for s in range(start[i], start[i + 1]):
+        for s in range(middle[i], start[i + 1]):
             j = column[s]
             if pair[j] < 0 and -entry[s] >= SAME * strongest > 0.0 and (partner < 0 or j < partner):
                 partner = j

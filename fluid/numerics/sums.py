@@ -1,12 +1,78 @@
-"""Momentum, kinetic energy and loads of many points, summed about one point."""
+"""Sums over a field; momentum, kinetic energy and loads of many points, summed about one point."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 
 from array_types import Array
-from kernels.decorators import ranged
-from kernels.threads import CHUNK, summed
+from fluid.numerics.fields import is_nothing
+from kernels.decorators import plain, ranged
+from kernels.threads import CHUNK, over, summed
+
+LEAF = 128
+"""Most numbers that np.sum adds up in one go; it halves longer fields until they are as short."""
+
+
+def total(field) -> float:
+    """Σ of a field (N,), to the bit of np.sum, by all threads."""
+    if is_nothing(field):
+        return 0.0
+    if len(field) <= LEAF:
+        return float(field.sum())
+    ends, joins = _halves(len(field))
+    found = np.empty(len(ends) - 1)
+    over(_leaves, len(found), field, ends, found, weight=LEAF // 10)
+    _join(joins, found)
+    return float(found[0])
+
+
+@lru_cache(maxsize=4)
+def _halves(n: int) -> tuple[Array, Array]:
+    """Ends (k + 1,) of the parts of n > LEAF numbers that np.sum adds up in one go, and in what order it joins the sums
+    of two neighbours (k - 1, 2): the first becomes that of both."""
+    ends, joins = [0], []
+
+    def parted(count: int) -> int:
+        if count <= LEAF:
+            ends.append(ends[-1] + count)
+            return len(ends) - 2
+        half = count // 2 - count // 2 % 8
+        left, right = parted(half), parted(count - half)
+        joins.append((left, right))
+        return left
+
+    parted(n)
+    return np.array(ends), np.array(joins)
+
+
+@ranged
+def _leaves(first, last, field, ends, found):
+    """Sums of the parts (k,): eight at a time, which are added by pairs, and then what is left."""
+    for part in range(first, last):
+        i, end = np.uint64(ends[part]), np.uint64(ends[part + 1])
+        a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        while i + np.uint64(8) <= end:
+            a += field[i]
+            b += field[i + np.uint64(1)]
+            c += field[i + np.uint64(2)]
+            d += field[i + np.uint64(3)]
+            e += field[i + np.uint64(4)]
+            f += field[i + np.uint64(5)]
+            g += field[i + np.uint64(6)]
+            h += field[i + np.uint64(7)]
+            i += np.uint64(8)
+        found[part] = ((a + b) + (c + d)) + ((e + f) + (g + h))
+        while i < end:
+            found[part] += field[i]
+            i += np.uint64(1)
+
+
+@plain
+def _join(joins, found):
+    for k in range(joins.shape[0]):
+        found[joins[k, 0]] += found[joins[k, 1]]
 
 
 def momentum_of(weight, u, place) -> Array:

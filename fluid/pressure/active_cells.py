@@ -15,8 +15,8 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 from fluid.domain.moments import wet_fraction
 from fluid.pressure.indefinite_cells import without_indefinite
-from kernels.decorators import kernel, released
-from kernels.threads import found_over
+from kernels.decorators import kernel, ranged, released
+from kernels.threads import found_over, over
 
 DRY = 1e-9
 """A fluid part that lies above φ = -DRY h holds no water."""
@@ -36,10 +36,11 @@ class WetPart:
     def of(cls, topology, domain, phi, spacing: float) -> WetPart:
         """The wet part below the level set φ (N,) [m]; spacing [m] of the mesh."""
         t = topology
-        below = (phi < 0.0) & t.active
+        below = np.empty(len(phi), bool)
+        over(_below, len(phi), phi, t.active, below)
         cells = t.cells_around(below)
         holding = _holding(domain, t, phi, -DRY * spacing)
-        dry = found_over(_dry, len(cells), cells, domain.is_cut, holding)
+        dry = found_over(_dry, len(cells), cells, domain.part, holding)
         if t.is_obtuse:
             holds = np.ones(len(cells), bool)
             holds[dry] = False
@@ -54,35 +55,44 @@ class WetPart:
         return cls(below, cells, wet_fraction(cells, phi, t.parts), void)
 
 
+@ranged
+def _below(first, last, phi, active, found):
+    for j in range(first, last):
+        i = np.uint64(j)
+        found[i] = phi[i] < 0.0 and active[i]
+
+
 @released
-def _dry(first, last, cells, is_cut, holding):
-    """Places in the list of the cells that are cut and hold no water."""
+def _dry(first, last, cells, part, holding):
+    """Places in the list of the cells that are cut and hold no water; part (M,), holding (K,): as in `_holding`."""
     found, n = np.empty(last - first, np.int64), 0
     for s in range(first, last):
-        if is_cut[cells[s]] and not holding[cells[s]]:
+        cut = part[cells[s]]
+        if cut >= 0 and not holding[np.uint64(cut)]:
             found[n] = s
             n += 1
     return found[:n].copy()
 
 
 def _holding(d, t, phi, dry):
-    """(M,) bool: cells with φ < dry at a corner outside the solids, or at a corner of a wetted polygon.
+    """(K,) bool: cut cells, by their `part`, with φ < dry at a corner outside the solids, or at a corner of a wetted
+    polygon.
 
     These are all corners of the fluid part, on which φ is linear; but not where thresholds of the covers part the water
     of a cell: a part may lie on no body there. The corners of such parts are those of the tetrahedra that fill them."""
-    holds = _lowest_below(
-        d.face_cell, d.face_corners, t.nodes, t.cells, t.parent, t.gradients, t.covered, phi, dry
-    )
+    holds = np.zeros(len(t.share) - 1, bool)
+    mesh = (d.part, t.nodes, t.cells, t.parent, t.gradients, t.covered)
+    _lowest_below(d.face_cell, d.face_corners, *mesh, phi, dry, holds)
     if d.memory.connection is not None and d.memory.connection.face > 0.0:
         bare = d.is_cut.copy()
         bare[d.face_cell] = False
-        _bare_below(np.flatnonzero(bare), t.cells, d.fan_start, d.fan_corners, phi, dry, holds)
+        _bare_below(np.flatnonzero(bare), d.part, t.cells, d.fan_start, d.fan_corners, phi, dry, holds)
     return holds
 
 
 @kernel
-def _bare_below(bare, cells, fan_start, corners, phi, dry, holds):
-    """Set holds (M,) in place for the cells bare (n,) with φ < dry at a corner of a tetrahedron of theirs; corners
+def _bare_below(bare, part, cells, fan_start, corners, phi, dry, holds):
+    """Set holds (K,) in place for the cells bare (n,) with φ < dry at a corner of a tetrahedron of theirs; corners
     (T, 4, 4): barycentric coordinates."""
     for e in bare:
         for s in range(fan_start[e], fan_start[e + 1]):
@@ -90,24 +100,24 @@ def _bare_below(bare, cells, fan_start, corners, phi, dry, holds):
                 level = 0.0
                 for a in range(4):
                     level += corners[s, q, a] * phi[cells[e, a]]
-                holds[e] = holds[e] or level < dry
+                holds[part[e]] = holds[part[e]] or level < dry
 
 
 @kernel
-def _lowest_below(face_cell, corners, nodes, cells, parent, g, covered, phi, dry):
-    holds = np.zeros(cells.shape[0], np.bool_)
+def _lowest_below(face_cell, corners, part, nodes, cells, parent, g, covered, phi, dry, holds):
     slope = np.empty(3)
     for s in range(face_cell.shape[0]):
         e = face_cell[s]
-        if holds[e]:
+        own = part[e]
+        if holds[own]:
             continue
         lowest = np.inf
         for a in range(4):
             i = cells[e, a]
             lowest = min(lowest, phi[i])
             if not covered[i] and phi[i] < dry:
-                holds[e] = True
-        if holds[e] or lowest >= dry:
+                holds[own] = True
+        if holds[own] or lowest >= dry:
             continue
         o = cells[e, 0]
         for k in range(3):
@@ -118,5 +128,4 @@ def _lowest_below(face_cell, corners, nodes, cells, parent, g, covered, phi, dry
             level = phi[o]
             for k in range(3):
                 level += slope[k] * (corners[s, q, k] - nodes[o, k])
-            holds[e] = holds[e] or level < dry
-    return holds
+            holds[own] = holds[own] or level < dry

@@ -26,10 +26,10 @@ def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | Non
     p = water.parameters
     if p.suction != "bounded":
         return None
-    vented = np.empty(len(dofs), bool)
+    bound, either = np.empty(len(dofs)), (p.vapour_pressure, max(of_air, p.vapour_pressure))
     state = (phi, water.open_to_air, water.ventilated)
-    over(_beside_air, len(dofs), dofs, graph.row, graph.start, graph.neighbour, *state, vented)
-    return np.where(vented, max(of_air, p.vapour_pressure), p.vapour_pressure)
+    over(_bounds, len(dofs), dofs, graph.row, graph.start, graph.neighbour, *state, either, bound)
+    return bound
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,8 +135,9 @@ def _add_quarters(face_cell, area, cells, of_nodes):
 
 
 @ranged
-def _beside_air(first, last, dofs, graph_row, start, neighbour, phi, open_to_air, ventilated, found):
-    """(n,) bool: nodes at or next to dry nodes, open sides or water that has separated."""
+def _bounds(first, last, dofs, graph_row, start, neighbour, phi, open_to_air, ventilated, either, bound):
+    """The first of two bounds (n,) [Pa], and the second at or next to dry nodes, open sides or water that has
+    separated."""
     for r in range(first, last):
         i = dofs[r]
         vented = open_to_air[i] or ventilated[i]
@@ -144,4 +145,4 @@ def _beside_air(first, last, dofs, graph_row, start, neighbour, phi, open_to_air
         for s in range(start[row], start[row + 1]):
             j = neighbour[s]
             vented = vented or phi[j] >= 0.0 or open_to_air[j] or ventilated[j]
-        found[r] = vented
+        bound[r] = either[1] if vented else either[0]

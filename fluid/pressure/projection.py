@@ -27,7 +27,7 @@ import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.domain.layers import WORK
-from fluid.numerics.fields import places_of
+from fluid.numerics.fields import accumulate, less, places_of
 from kernels.decorators import kernel, ranged
 from kernels.threads import over, owning, reach_of_cells
 
@@ -75,7 +75,7 @@ class PressureProblem:
     @property
     def lower(self) -> Array | None:
         """Bound of x (n,) [Pa]."""
-        return None if self.bound is None else self.bound - self.known
+        return None if self.bound is None else less(self.bound, self.known)
 
     @property
     def air(self) -> Array | None:
@@ -201,7 +201,7 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
     n, edges = len(dofs), graph.edges
     indptr = np.zeros(n + 1, np.int32)
     over(_row_lengths, n, dofs, column, edges, indptr[1:])
-    np.cumsum(indptr, out=indptr)
+    accumulate(indptr)
     indices, entries = np.empty(indptr[n], np.int32), np.empty(indptr[n])
     anchored, turned = np.zeros(n, bool), np.zeros(n)
     made = Rows(indptr, indices, entries, anchored, turned)

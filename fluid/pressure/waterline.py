@@ -23,24 +23,24 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.hats import POLYGON, hats_at, value_at
-from fluid.domain.moments import cells_touching, marked_corners
+from fluid.domain.moments import marked_corners
 from fluid.pressure.projection import with_ghosts
 from kernels.decorators import inner, kernel, released
 from kernels.threads import over
 
 
 class WaterlineLoad:
-    """R of (2) over the bodies of a domain, of any pressure.
+    """R of (2) over the bodies of a domain with its topology, of any pressure.
 
     faces (k,) rows of the polygons of G · left_out (l,) rows of those not in G though their cells hold water ·
     phi (N,) [m] · wet (N,) bool · before (N,) [Pa]: pressure of the last step, read on wet nodes · open_node (N,) bool:
     p = 0, no seas · air: pressures (K,) [Pa] of trapped air → (N,) [Pa] at dry nodes, None: there is none. It acts on
     both sides of the surface, so that R is that of the pressure above it."""
 
-    def __init__(self, domain, faces, left_out, phi, wet, before, open_node, air=None):
-        self._domain, self._phi, self._wet, self._before, self._air = domain, phi, wet, before, air
-        count = marked_corners(domain.face_cell[faces], wet, domain.cells)
-        mixed = faces[(count > 0) & (count < 4)]
+    def __init__(self, topology, domain, faces, left_out, phi, wet, before, open_node, air=None):
+        self._topology, self._domain, self._phi, self._wet = topology, domain, phi, wet
+        self._before, self._air = before, air
+        mixed = _partly_wet(faces, domain.face_cell, domain.cells, wet)
         self._rows, self._mixed = np.concatenate([mixed, left_out]), len(mixed)
         self._open, self._beside = open_node, None
 
@@ -64,7 +64,7 @@ class WaterlineLoad:
         if self._beside is None:
             reached = np.zeros(len(self._phi), bool)
             reached[domain.cells[domain.face_cell[self._rows]]] = True
-            self._beside = cells_touching(reached, domain.cells)
+            self._beside = self._topology.cells_around(reached)
         solved = self._wet & ~self._open
         p = np.where(solved, pressure, 0.0)
         outside = np.zeros(len(p)) if self._air is None else self._air(of_air)
@@ -84,6 +84,20 @@ class WaterlineLoad:
         )
         _sum_on_bodies(self._rows, domain.face_body, found, load)
         return load
+
+
+@kernel
+def _partly_wet(faces, face_cell, cells, wet):
+    """Those of the listed polygons (k,) whose cell has wet corners and dry ones, in order; wet (N,) bool."""
+    found, n = np.empty(len(faces), np.int64), 0
+    for s in range(len(faces)):
+        count = 0
+        for a in range(4):
+            count += wet[cells[face_cell[faces[s]], a]]
+        if 0 < count < 4:
+            found[n] = faces[s]
+            n += 1
+    return found[:n].copy()
 
 
 def _surface_of(domain):

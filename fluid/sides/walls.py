@@ -154,6 +154,8 @@ class Walls:
         falls back from an open top would never end, and would run down the wall faster and faster.  Nodes at least one
         cell below the surface are left alone, so that a full channel open at both ends keeps flowing."""
         nodes, normal = self.outward
+        if len(nodes) == 0:
+            return
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
         coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
         over = (normal @ up > LYING_OVER) & (phi[nodes] < spacing[nodes])
@@ -162,6 +164,10 @@ class Walls:
         level = phi[nodes]
         drain_films(level, spacing[nodes])  # water up to the brim, rounded
         phi[nodes] = level
+
+    def wet(self, phi):
+        """φ < 0 (N,) bool for `slip`; None where no side holds the water, since it is not needed there."""
+        return phi < 0.0 if len(self.sticking) else None
 
     def slip(self, u, wet=None) -> None:
         """Remove the velocity into the closed sides from u (N, 3) [m/s], in place, and where u = 0 all of it, but for

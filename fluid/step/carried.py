@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from fluid.numerics.fields import is_nothing, nothing
 from fluid.step.kick import kicked
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
@@ -19,7 +18,7 @@ def carried_by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
     """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; kick
     (N,): `kick_factor`."""
     found = _by_fluxes(water, dt, theta, kick)
-    if water.given_by_films.any():
+    if not is_nothing(water.given_by_films) and water.given_by_films.any():
         found = replace(found, water=found.water + dt * water.given_by_films)
     found = found if water.renumbered is None else found.handed_on(water.renumbered)
     if water.slits is None:
@@ -38,5 +37,5 @@ def _by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
     if p.advection == "supg":
         found = found.near_the_surface()
     if t.is_obtuse:
-        return replace(found, swept=np.zeros(len(phi)))
+        return replace(found, swept=nothing(len(phi)))
     return replace(found, swept=swept(t, flux, phi, u_m, moved, dt))

@@ -15,9 +15,9 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors, first_from
-from fluid.numerics.fields import copied_at, less
+from fluid.numerics.fields import copied_at, divided, less, marks_of, nothing
 from fluid.numerics.multigrid import unsigned
-from fluid.numerics.sums import dots, kinetic_energies, kinetic_energy
+from fluid.numerics.sums import dots, kinetic_energies, kinetic_energy, total
 from fluid.pressure.damping import Waterline, damp_divergence, damp_waterline
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
@@ -117,7 +117,7 @@ def corrected(water, problem, x, parting) -> Corrected:
         velocity=u,
         acceleration=a,
         pressure=pressure,
-        end_pressure=unknown / kept.theta,
+        end_pressure=divided(unknown, kept.theta),
         remainder=remainder,
         kick_remainder=kick_remainder,
         cell_velocity=cell_field,
@@ -141,10 +141,12 @@ def _placed(first, last, dofs, x, known, unknown, pressure):
 
 
 def _given_by_films(water, problem):
-    """Rate (N,) [m³/s] at which films take water from their rims as the bodies move."""
-    found, given = np.zeros(len(problem.predicted.wet)), problem.predicted.given_by_films
-    if given is not None:
-        found[problem.of_water(problem.dofs)] = given @ water.pushed_by.ravel()
+    """Rate (N,) [m³/s] at which films take water from their rims as the bodies move; `nothing` without films."""
+    n, given = len(problem.predicted.wet), problem.predicted.given_by_films
+    if given is None:
+        return nothing(n)
+    found = np.zeros(n)
+    found[problem.of_water(problem.dofs)] = given @ water.pushed_by.ravel()
     return found
 
 
@@ -258,8 +260,8 @@ def _continue(water, kept, listed, start, u, a, forced, dt, calm) -> None:
     extend_velocity(t, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
     outside = listed[start[1] : start[2]]
     p = water.parameters
-    fast, some = by_speed(outside, forced, p.gravity, p.viscosity / p.density, t.node_size)
-    if some:
+    fast = np.empty(len(u))
+    if by_speed(outside, forced, p.gravity, p.viscosity / p.density, t.node_size, fast):
         borne = Borne(t, outside, kept.wet, kept.nodal_water, fast, kept.in_jumps)
         borne.give(forced, u)
         own = np.empty(a.shape)
@@ -297,9 +299,7 @@ def _flux(water, kept, listed, start, u, gradient, dt):
     [m/s] of the wet cells, dt [s] of this step."""
     t = water.topology
     reached = listed[: start[FLUX_LAYERS + 1]]
-    near = np.zeros(len(u), bool)
-    near[reached] = True
-    around = t.cells_around(near)
+    around = t.cells_around(marks_of(reached, len(u)))
     now, before = np.empty((len(around), 3)), np.empty((len(around), 3))
     wet = (kept.wet_cells, kept.cell_star, gradient)
     over(
@@ -381,7 +381,7 @@ def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
     if water.viscous is not None:
         change["transport and gravity"] -= kept.shear.energy
         change["viscosity and friction"] = kept.shear.energy
-    volume = float(moments[2, 1]) - float(kept.displaced.sum()) - kept.in_films[0]
+    volume = float(moments[2, 1]) - total(kept.displaced) - kept.in_films[0]
     left = kept.left
     return StepReport(
         dt=problem.dt,

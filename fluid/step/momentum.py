@@ -31,9 +31,10 @@ import numpy as np
 
 from array_types import Array, Floats
 from fluid.numerics.sums import about, momenta_of_rows, momentum_of, momentum_of_rows
-from kernels.decorators import inlined, ranged, released
+from kernels.decorators import inlined, plain, ranged, released
 from kernels.threads import CHUNK, found_over, over, summed
 
+EVERYWHERE = np.zeros(0, bool)
 ZERO = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NUMERICAL = (
     "transport",
@@ -195,8 +196,9 @@ def _reactions(water, kept, x, p, dt):
     cells = _all_cells(kept)
     mesh = (t.nodes, t.fluid_cells)
     of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
-    of_sides += _on_bodies(water, p, at_side)
-    return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * _on_bodies(water, p)
+    of_bodies = _on_bodies(water, p)
+    of_sides += _on_bodies(water, p, at_side) if water.domain.n_bodies else of_bodies
+    return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * of_bodies
 
 
 def _at_closed_openings(water, kept, p, dt):
@@ -230,9 +232,14 @@ def _of_air(water, problem, unknown, pressure):
 
 def _on_bodies(water, p, where=None):
     """Gᵀ p about the reference (6,) [N, N m], of the nodes `where` (N,) bool only; None: of all."""
-    beside, of_bodies = water.beside_bodies
-    held = p[beside] if where is None else np.where(where[beside], p[beside], 0.0)
-    return about(water.reference, of_bodies @ held, water.domain.body_centre)
+    loads = np.zeros((water.domain.n_bodies, 6))
+    if len(loads) == 0:
+        return np.zeros(6)
+    beside, rows = water.beside_bodies
+    where = EVERYWHERE if where is None else where
+    every, matrix = np.arange(len(beside)), (rows.indptr, rows.indices, rows.data)
+    _add_rows(every, beside, p, where, matrix, loads.reshape(-1))
+    return about(water.reference, loads, water.domain.body_centre)
 
 
 def _loads(water, problem, p):
@@ -240,14 +247,29 @@ def _loads(water, problem, p):
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
     coupling = problem.coupling
     # Few nodes have rows that are not empty; the product with the transpose would go through all. p is 0 in the air.
-    rows = found_over(_not_empty, coupling.shape[0], coupling.indptr)
-    held = np.repeat(p[problem.dofs[rows]], coupling.indptr[rows + 1] - coupling.indptr[rows])
-    of_pressure = np.bincount(coupling.indices, coupling.data * held, coupling.shape[1])
-    on_bodies = problem.other_load - of_pressure.reshape(-1, 6)
-    on_bodies = dt * about(water.reference, on_bodies, centre)
+    if len(centre) == 0:
+        on_bodies = np.zeros(6)
+    else:
+        rows = found_over(_not_empty, coupling.shape[0], coupling.indptr)
+        of_pressure = np.zeros(coupling.shape[1])
+        matrix = (coupling.indptr, coupling.indices, coupling.data)
+        _add_rows(rows, problem.dofs, p, EVERYWHERE, matrix, of_pressure)
+        on_bodies = problem.other_load - of_pressure.reshape(-1, 6)
+        on_bodies = dt * about(water.reference, on_bodies, centre)
     if shear is None:
         return on_bodies, np.zeros(6), np.zeros(6)
     return on_bodies, dt * about(water.reference, shear.load, centre), dt * shear.tank
+
+
+@plain
+def _add_rows(rows, nodes, p, where, matrix, out):
+    """out (m,) += p (N,) times the listed rows (k,) of a csr matrix (n, m), which belong to the nodes (n,); p counts
+    `where` (N,) bool alone."""
+    indptr, indices, data = matrix
+    for r in rows:
+        value = p[nodes[r]] if len(where) == 0 or where[nodes[r]] else 0.0
+        for s in range(indptr[r], indptr[r + 1]):
+            out[indices[s]] += data[s] * value
 
 
 @released

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fluid.numerics.fields import is_nothing, less
 from fluid.surface.volume import nodal_volume
 
 if TYPE_CHECKING:
@@ -20,10 +21,11 @@ def potential_energy(water: Water) -> float:
 
     What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
     a millionth of a deep pool would outweigh a small wave."""
-    p, held = water.parameters, water.nodal_water - water.displaced
+    p, held = water.parameters, less(water.nodal_water, water.displaced)
     found = -p.density * (float(held @ water.nodes_below_floor) - water.film_potential)
     surface, farther = _at_surface(water), water.taken_by(water.farther)
-    found += p.density * float(farther @ (water.nodes_below_floor - surface))
+    if not is_nothing(farther):
+        found += p.density * float(farther @ (water.nodes_below_floor - surface))
     return found + p.density * (water.volume() - water.conserved_volume) * surface
 
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.coupling_matrix import rows_of, wetted_coupling
-from fluid.numerics.fields import added, copied, taken_at
+from fluid.numerics.fields import added, copied, is_nothing, taken_at
+from fluid.numerics.sums import total
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -123,7 +124,7 @@ def predicted(water, dt: float) -> PressureProblem:
     theta, kick = water.theta(dt, crossing), water.kick_factor(crossing)
     u_adv, phi = _transported(water, dt, theta, kick)
     found = carried_by_fluxes(water, dt, theta, kick)
-    carried = added(found.water, found.swept)
+    carried = copied(found.water) if is_nothing(found.swept) else added(found.water, found.swept)
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
     if left is not None:
         carried -= left.volume
@@ -154,7 +155,7 @@ def predicted(water, dt: float) -> PressureProblem:
     if len(filled):
         carried[filled] = water.topology.node_volume[filled]
         in_films = water.in_films(phi)
-    beside = float(displaced.sum()) + in_films[0]
+    beside = total(displaced) + in_films[0]
     calm = water.calm(dt, crossing)
     held = added(carried, displaced)
     phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, water.on_one_side)
@@ -172,7 +173,7 @@ def predicted(water, dt: float) -> PressureProblem:
             water.topology,
             water.walls.open_node,
         )
-        water.hold(u_adv, water.time + dt, surface.level_set < 0.0)
+        water.hold(u_adv, water.time + dt, water.walls.wet(surface.level_set))
     shear = None
     if water.viscous is not None:
         shear = _sheared(water, dt, theta, kick, surface, u_adv)
@@ -216,7 +217,7 @@ def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
     u_hat, u_m = kicked(water.velocity, water.acceleration, kick, 1.0, (1.0 - theta) * dt, to_middle)
-    wet = water.level_set < 0.0
+    wet = water.walls.wet(water.level_set)
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt, wet)
     moved = transport(water.topology, water.listed, dt, u_m, u_hat, water.level_set, water.walls.open_node)
@@ -238,7 +239,7 @@ def _transported(water, dt, theta, kick):
     width = TRANSPORT_WIDTH * water.mesh.spacing
     over(_taken_over, len(moved), water.listed, moved, water.topology.finer, width, u_adv, phi)
     water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))
-    water.hold(u_adv, water.time + dt, phi < 0.0)
+    water.hold(u_adv, water.time + dt, water.walls.wet(phi))
     return u_adv, phi
 
 
@@ -291,8 +292,9 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         # at the edge that a sea shares with an inflow the pressure is sought, not held
         held[~water.walls.open_node] = 0.0
         rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
-    known, guess = np.empty(len(dofs)), np.empty(len(dofs))
-    over(_of_last_step, len(dofs), dofs, theta, kick, water.end_pressure, known, guess)
+    known, guess, at_bound = np.empty(len(dofs)), np.empty(len(dofs)), np.empty(len(dofs), bool)
+    state = (water.end_pressure, water.at_bound)
+    over(_of_last_step, len(dofs), dofs, theta, kick, *state, known, guess, at_bound)
     coupling, faces, left_out = _coupling(water, part.void)
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     if water.slits is not None:
@@ -342,7 +344,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         acted = np.where(held == 0.0, acted, held / theta)
     air, of_air = (None, ()) if cushions is None else (cushions.air.nodal, cushions.pressure)
     least = 0.0 if cushions is None else cushions.lowest(dt)
-    waterline = WaterlineLoad(water.domain, faces, left_out, phi, wet, acted, unheld, air)
+    waterline = WaterlineLoad(t, water.domain, faces, left_out, phi, wet, acted, unheld, air)
     other = at_waterline = waterline.before(of_air)
     if held is not None:
         beside = np.flatnonzero(wet & (held != 0.0))
@@ -363,7 +365,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         at_waterline=at_waterline,
         predicted=kept,
         bound=lowest_pressure(water, graph, dofs, phi, least),
-        at_bound=water.at_bound[dofs],
+        at_bound=at_bound,
         of_open_air=least,
     )
     if water.films is not None:
@@ -372,13 +374,13 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
 
 
 @ranged
-def _of_last_step(first, last, dofs, theta, kick, pressure, known, guess):
+def _of_last_step(first, last, dofs, theta, kick, pressure, held, known, guess, at_bound):
     """What the pressure (N,) [Pa] at the end of the last step gives the nodes dofs (n,): its part that goes on, by
-    kick (N,), and a first guess of what is sought."""
+    kick (N,), a first guess of what is sought, and where it was at its bound, held (N,) bool."""
     for s in range(first, last):
         i = dofs[s]
         known[s] = (1.0 - theta) * kick[i] * pressure[i]
-        guess[s] = theta * pressure[i]
+        guess[s], at_bound[s] = theta * pressure[i], held[i]
 
 
 @released

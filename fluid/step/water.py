@@ -22,7 +22,8 @@ from fluid.domain.layers import layers_around
 from fluid.domain.physical_domain import wetted_coupling
 from fluid.domain.topology import Graph, Topology
 from fluid.mesh.background import Background
-from fluid.numerics.sums import kinetic_energy
+from fluid.numerics.fields import nothing
+from fluid.numerics.sums import kinetic_energy, total
 from fluid.pressure.displaced import taken_from_nodes
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
@@ -138,13 +139,13 @@ class Water:
         self.at_bound, self.ventilated = np.zeros(n, bool), np.zeros(n, bool)
         self.cell_velocity = self.remainder = self.kick_remainder = CellVectors.none()
         self.nodal_water = nodal_volume(self.topology, self.level_set)
-        self.displaced = np.zeros(n)
+        self.displaced = nothing(n)
         """(N,) [m³], part of `nodal_water`: what the bodies take of it as they move on to where the surface is."""
         self.film_volume = self.film_potential = 0.0
         """Part of `nodal_water` [m³] in films between bodies, and its ∫ g·x dV [m⁵/s²]."""
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
-        self.given_by_films = np.zeros(n)
+        self.given_by_films = nothing(n)
         """(N,) [m³/s] that films and their rims gave each other over the last step (`films.py`)."""
         self.find_band()
         self._start_speed = 0.0
@@ -413,8 +414,8 @@ class Water:
         """g·x (N,) [m²/s²] of the nodes."""
         self.coupling = wetted_coupling(domain).tocsr()
         beside = np.flatnonzero(np.diff(self.coupling.indptr))
-        self.beside_bodies = beside, self.coupling[beside].T
-        """Nodes (n,) with an entry in the coupling, and their rows of it as columns."""
+        self.beside_bodies = beside, self.coupling[beside]
+        """Nodes (n,) with an entry in the coupling, and their rows of it."""
         self.on_one_side = on_one_side(domain, beside)
         """Those of them (n,) that reach walls from one side alone."""
         self.walls = self._sides.on_domain(domain, self.mesh)
@@ -484,6 +485,8 @@ class Water:
         """Nodes (N,) bool on open sides that have the pressure of the side: wet ones, φ (N,) < 0, and all of seas.
 
         At a dry node of an open side the surface lies below it; the weight beyond a sea acts above its level, too."""
+        if len(self.walls.open_nodes) == 0:
+            return self.walls.open_node
         held = self.walls.open_node & (phi < 0.0)
         for side in self.sides.now if self.sides is not None else ():
             if side.is_sea:
@@ -506,7 +509,7 @@ class Water:
 
     def volume(self) -> float:
         """Water in the tank [m³]."""
-        return float(self.nodal_water.sum()) - float(self.displaced.sum()) - self.film_volume
+        return total(self.nodal_water) - total(self.displaced) - self.film_volume
 
     def displacement(self, dt: float) -> Array:
         """Volume (N,) [m³] that the bodies have displaced at the nodes since the cells were cut, at the end of a step
@@ -518,9 +521,10 @@ class Water:
         return self.taken_by(way)
 
     def taken_by(self, way) -> Array:
-        """Volume (N,) [m³] that bodies displace at the nodes over a motion (n_bodies, 6) [m, rad]."""
+        """Volume (N,) [m³] that bodies displace at the nodes over a motion (n_bodies, 6) [m, rad]; `nothing` without
+        one."""
         if not way.any():
-            return np.zeros(len(self.level_set))
+            return nothing(len(self.level_set))
         return taken_from_nodes(self.domain, self.coupling, self.level_set, way)
 
     def volume_error(self) -> float:

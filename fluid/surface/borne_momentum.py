@@ -35,24 +35,21 @@ class Borne:
     def __init__(self, topology, outside, wet, water, fast, in_jumps) -> None:
         self._outside, self._wet, self._water = outside, wet, water
         self._nodes, self._around = topology.nodes, topology.around_by_cells
-        self._borne, self._total = np.zeros(len(wet)), np.zeros(len(wet))
+        self._borne, self._total = np.empty(len(wet)), np.empty(len(wet))
         state = (water, topology.node_volume, fast, np.zeros(0) if in_jumps is None else in_jumps)
-        made = (self._borne, self._total)
+        made = (self._borne, self._total, np.zeros(len(wet), bool))
         over(_to_be_borne, len(outside), *self._rows(), state, made, weight=WORK)
-        beside = np.zeros(len(wet), bool)
-        over(_mark, len(outside), outside, self._borne, wet, self._around, beside)
-        self._bearing = taken(beside)
+        self._bearing = taken(made[2])
 
     def _rows(self):
         return self._outside, self._wet, self._nodes, self._around
 
     def give(self, own, field) -> None:
         """field (N, 3), continued, in place: Σ W field as with `own` (N, 3) at the nodes outside."""
-        gained = np.zeros(field.shape)
+        gained = np.empty(field.shape)
         held = (self._water, self._borne, self._total)
-        rows = (self._bearing, self._nodes, self._around)
-        over(_gained, len(self._bearing), *rows, held, own, field, gained, weight=WORK)
-        over(_moved, len(self._bearing), self._bearing, gained, field)
+        rows = (self._bearing, self._wet, self._nodes, self._around)
+        over(_gained, len(self._bearing), *rows, held, own, gained, field, weight=WORK)
         over(_followed, len(self._outside), *self._rows(), held, gained, field, weight=WORK)
 
 
@@ -65,11 +62,13 @@ def _weight(i, j, shared, nodes):
 
 @ranged
 def _to_be_borne(first, last, outside, wet, nodes, around_by_cells, state, made):
-    """made: s W (N,) [m³], and the sum of the weights of the nodes in the water around (N,), both zero at first."""
-    (water, capacity, fast, in_jumps), (borne, total) = state, made
+    """made, at the nodes outside: s W (N,) [m³], and the sum of the weights of the nodes in the water around (N,); and
+    these nodes (N,) bool, where there is something to bear."""
+    (water, capacity, fast, in_jumps), (borne, total, bearing) = state, made
     start, around, shared = around_by_cells
     for s in range(first, last):
         i = np.uint64(outside[np.uint64(s)])
+        borne[i], total[i] = 0.0, 0.0
         if water[i] <= NO_WATER * capacity[i] or fast[i] <= 0.0:
             continue
         for t in range(start[i], start[i + np.uint64(1)]):
@@ -77,43 +76,30 @@ def _to_be_borne(first, last, outside, wet, nodes, around_by_cells, state, made)
                 total[i] += _weight(i, around[t], shared[t], nodes)
         share = fast[i] * (1.0 - in_jumps[i] if in_jumps.shape[0] > 0 else 1.0)
         borne[i] = share * water[i] if total[i] > 0.0 else 0.0
-
-
-@ranged
-def _mark(first, last, outside, borne, wet, around_by_cells, beside):
-    """Nodes (N,) bool in the water around those with borne > 0."""
-    start, around, _ = around_by_cells
-    for s in range(first, last):
-        i = np.uint64(outside[np.uint64(s)])
         if borne[i] > 0.0:
             for t in range(start[i], start[i + np.uint64(1)]):
                 if wet[around[t]]:
-                    beside[around[t]] = True
+                    bearing[around[t]] = True
 
 
 @ranged
-def _gained(first, last, bearing, nodes, around_by_cells, held, own, field, gained):
-    """d (N, 3) of (1) at the bearing nodes."""
+def _gained(first, last, bearing, wet, nodes, around_by_cells, held, own, gained, field):
+    """d (N, 3) of (1) at the bearing nodes, which is added to the field there."""
     (water, borne, total), (start, around, shared) = held, around_by_cells
     for s in range(first, last):
         j = np.uint64(bearing[np.uint64(s)])
         mass = max(water[j], 0.0)
+        for k in range(3):
+            gained[j, k] = 0.0
         for t in range(start[j], start[j + np.uint64(1)]):
             i = around[t]
-            if borne[i] > 0.0:
+            if not wet[i] and borne[i] > 0.0:
                 part = borne[i] * _weight(i, j, shared[t], nodes) / total[i]
                 mass += part
                 for k in range(3):
                     gained[j, k] += part * (own[i, k] - field[i, k])
         for k in range(3):
             gained[j, k] /= mass
-
-
-@ranged
-def _moved(first, last, bearing, gained, field):
-    for s in range(first, last):
-        j = bearing[s]
-        for k in range(3):
             field[j, k] += gained[j, k]
 
 

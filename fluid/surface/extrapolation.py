@@ -14,6 +14,7 @@ import numpy as np
 from array_types import Bools, Floats
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
+from fluid.numerics.fields import marks_of
 from kernels.decorators import inlined, inner, ranged, released
 from kernels.threads import over, owning, reach_of_cells
 
@@ -253,26 +254,13 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     if sweeps > 1:
         over(_combined, start[1], order, calm, once, before, slope)
     # values are also continued from marked nodes whose other cells with dry corners are not listed
-    over(_clear_unless, len(u), _listed(order[: start[1]], len(u)), marked, once.reshape(len(u), -1))
+    over(_clear_unless, len(u), marks_of(order[: start[1]], len(u)), marked, once.reshape(len(u), -1))
     return once
 
 
 def _cells_of(nodes, cell_list, cells, n):
     """Those of the listed cells that have one of these nodes, of 0 ... n."""
-    return touching_among(cell_list, _listed(nodes, n), cells)
-
-
-def _listed(nodes, n):
-    """Which of 0 ... n are in a list, (n,) bool."""
-    listed = np.zeros(n, bool)
-    over(_mark, len(nodes), nodes, listed)
-    return listed
-
-
-@ranged
-def _mark(first, last, nodes, marked):
-    for s in range(first, last):
-        marked[np.uint64(nodes[np.uint64(s)])] = True
+    return touching_among(cell_list, marks_of(nodes, n), cells)
 
 
 @ranged
@@ -344,8 +332,8 @@ def _average(first, last, nodes, has, node_start, around_by_cells, field, mean):
 
 
 def _own_speed(nodes, factor, forced):
-    """factor |forced| (N,) at the listed nodes, zero elsewhere."""
-    out = np.zeros(len(forced))
+    """factor |forced| (N,) at the listed nodes, which alone are read; anything elsewhere."""
+    out = np.empty(len(forced))
     over(_speed_of, len(nodes), nodes, factor, forced, out)
     return out
 
@@ -358,14 +346,13 @@ def _speed_of(first, last, nodes, factor, forced, out):
 
 def _clear_outside(order, u, a):
     """u, a (N, 3) ← 0 at the nodes that are not in the list, in place."""
-    listed = _listed(order, len(u))
-    over(_clear, len(u), listed, u, a)
+    over(_clear, len(u), marks_of(order, len(u)), u, a)
 
 
 @ranged
-def _clear(first, last, listed, u, a):
+def _clear(first, last, kept, u, a):
     for i in range(first, last):
-        if not listed[i]:
+        if not kept[i]:
             for k in range(3):
                 u[i, k], a[i, k] = 0.0, 0.0
 

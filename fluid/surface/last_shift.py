@@ -18,6 +18,7 @@ import numpy as np
 
 from fluid.domain.moments import nodal_water
 from fluid.numerics.fields import copied
+from fluid.numerics.sums import total
 from fluid.surface.pools import own_shift, pools
 from kernels.decorators import ranged
 from kernels.threads import over
@@ -31,7 +32,7 @@ secant steps."""
 
 def met_total(t, near, phi, moved, wanted, tolerance: float, most: float, spacing):
     """φ after the last shift (3), which brings the water in the cells `near` to a target [m³] within a tolerance [m³],
-    that water (N,) [m³], and the volume [m³] that the shift moved.
+    that water (N,) [m³], the sum of it [m³], and the volume [m³] that the shift moved.
 
     moved: the band (n,), c (N,) [m²] and ψ (n,) [m] of (2) · wanted: W and what is in other cells (N,) [m³], target ·
     most: limit of the shift in sizes of the cells at each node, `spacing` (N,) [m].
@@ -39,29 +40,30 @@ def met_total(t, near, phi, moved, wanted, tolerance: float, most: float, spacin
     length for all."""
     (band, slope, psi), (carried, inner, target) = moved, wanted
     before = nodal_water(near, 0.0, phi, t.parts, len(phi))
-    start = float(before.sum())
-    if abs(target - start) <= tolerance or slope.sum() <= 0.0:
-        return phi, before, 0.0
+    start = volume = total(before)
     shifted, held = phi, before
-    uniform = np.full(len(band), abs(target - start) / slope.sum())
-    label, count = pools(phi, *t.around)
-    own = uniform
-    if count > 1:
-        own = own_shift(label, count, carried - inner - before, slope, target - start)[band]
-    for way in (np.abs(psi) + EVERYWHERE * own, own, uniform)[: 3 if count > 1 else 2]:
-        shifted, held = _along(t, near, (phi, before), (band, slope, way), target, tolerance, most, spacing)
-        if abs(target - float(held.sum())) <= tolerance:
-            break
-    return shifted, held, float(held.sum()) - start
+    area = total(slope) if abs(target - start) > tolerance else 0.0
+    if area > 0.0:
+        uniform = np.full(len(band), abs(target - start) / area)
+        label, count = pools(phi, *t.around)
+        own = uniform
+        if count > 1:
+            own = own_shift(label, count, band, (carried, inner, before), slope, target - start)
+        for way in (np.abs(psi) + EVERYWHERE * own, own, uniform)[: 3 if count > 1 else 2]:
+            state, moved = (phi, before, start), (band, slope, way)
+            shifted, held, volume = _along(t, near, state, moved, target, tolerance, most, spacing)
+            if abs(target - volume) <= tolerance:
+                break
+    return shifted, held, volume, volume - start
 
 
 def _along(t, near, state, moved, target, tolerance, most, spacing):
-    """φ (N,) and its water (N,) [m³] in the cells `near` after secant steps along a way (n,) [m] on the band, each node
-    within `most` of its cells; state: both before, moved: band, c and the way."""
-    (phi, held), (band, slope, way) = state, moved
-    shifted, s, volume = phi, 0.0, float(held.sum())
+    """φ (N,), its water (N,) [m³] in the cells `near` and the sum of it [m³] after secant steps along a way (n,) [m] on
+    the band, each node within `most` of its cells; state: these before, moved: band, c and the way."""
+    (phi, held, volume), (band, slope, way) = state, moved
+    shifted, s = phi, 0.0
     area = float(slope[band] @ way)
-    farthest = most * float((spacing[band] / np.maximum(way, 1e-300)).max())
+    farthest = most * max(over(_longest_way, len(band), band, way, spacing))
     for _ in range(MOST_SECANTS):
         if abs(target - volume) <= tolerance or area <= 0.0:
             break
@@ -71,9 +73,18 @@ def _along(t, near, state, moved, target, tolerance, most, spacing):
         shifted = copied(phi) if shifted is phi else shifted
         over(lower, len(band), band, phi, trial * way, most, spacing, shifted)
         held = nodal_water(near, 0.0, shifted, t.parts, len(phi))
-        before, volume = volume, float(held.sum())
+        before, volume = volume, total(held)
         area, s = (volume - before) / (trial - s), trial
-    return shifted, held
+    return shifted, held, volume
+
+
+@ranged
+def _longest_way(first, last, band, way, spacing):
+    """Largest spacing of the band over its way (n,) [m]."""
+    longest = 0.0
+    for s in range(first, last):
+        longest = max(longest, spacing[band[s]] / max(way[s], 1e-300))
+    return longest
 
 
 @ranged

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from kernels.decorators import inner, kernel, ranged, released
+from kernels.decorators import inner, kernel, plain, ranged, released
 from kernels.threads import found_over, over
 
 WORK = 3
@@ -122,15 +122,26 @@ def _joined(before, root, other):
     return low
 
 
-def own_shift(label, count: int, lack, area, total: float) -> Array:
-    """Length (N,) [m] by which the surface of each pool is to rise, or to sink, for what the pool itself lacks, or has
-    too much: 0 in those that are off in the other way than the total, and where there is no surface.
+def own_shift(label, count: int, band, water, area, total: float) -> Array:
+    """Length (n,) [m] by which the surface at the nodes of the band (n,) is to rise, or to sink, for what its pool
+    lacks, or has too much: 0 in those that are off in the other way than the total, and where there is no surface.
 
-    label (N,), count: of `pools` · lack (N,) [m³], area (N,) [m²]: of the nodes · total [m³]: what all water
-    lacks, of which the sign counts."""
-    there = label >= 0
-    off, surface = (
-        np.bincount(label[there], values[there], minlength=count) for values in (np.sign(total) * lack, area)
-    )
+    label (N,), count: of `pools` · water: W, and what is inside and near the surface of it (N,) [m³] · area (N,) [m²] ·
+    total [m³]: what all water lacks, of which the sign counts."""
+    off, surface = np.zeros((2, count))
+    _of_pools(label, water, np.sign(total), area, off, surface)
     length = np.where(surface > 0.0, np.maximum(off, 0.0) / np.where(surface > 0.0, surface, 1.0), 0.0)
-    return np.where(there, length[label], 0.0)
+    pool = label[band]
+    return np.where(pool >= 0, length[pool], 0.0)
+
+
+@plain
+def _of_pools(label, water, sign, area, off, surface):
+    """What each pool lacks, times the sign, and its area (count,), both zero at first."""
+    carried, inner, near = water
+    for k in range(label.shape[0]):
+        i = np.uint64(k)
+        if label[i] >= 0:
+            pool = np.uint64(label[i])
+            off[pool] += sign * (carried[i] - inner[i] - near[i])
+            surface[pool] += area[i]

@@ -37,7 +37,8 @@ from fluid.domain.cell_vectors import CellVectors
 from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import PAIR, Graph
-from fluid.numerics.fields import PLAIN, added, copied, places_of
+from fluid.numerics.fields import PLAIN, accumulate, added, copied, marks_of, places_of
+from fluid.numerics.sums import total
 from fluid.surface.last_shift import LAST_SHIFTS, lower, met_total
 from fluid.surface.level_set import drain_films
 from kernels.decorators import kernel, ranged, released
@@ -177,9 +178,9 @@ def diffused_shift(band, place, edges, c, residual, kappa, spacing, tolerance, m
     place (N,): their places in the band, -1 elsewhere · κ = kappa times the spacing (N,) [m] · at most `most`
     iterations, until the residual has fallen by the tolerance."""
     n, diagonal = len(band), c.copy()
-    found = np.zeros(n + 1, np.uint32)
-    over(_length_of_rows, n, band, place, edges, found[1:])
-    first = np.cumsum(found, dtype=np.uint32)
+    first = np.zeros(n + 1, np.uint32)
+    over(_length_of_rows, n, band, place, edges, first[1:])
+    accumulate(first)
     made = MadeRows(first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
     over(_rows_of_shift, n, band, place, edges, kappa, spacing, made)
     return _shift(first, made.column, made.entry, diagonal, residual, tolerance, most)
@@ -315,9 +316,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
 
     kappa in cell sizes · spacing (N,) [m]: size of the cells at each node ·
     listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
-    n = len(phi)
-    seen = np.zeros(n, bool)
-    seen[listed] = True
+    n, seen = len(phi), marks_of(listed, len(phi))
     inner, near = _parted(topology, seen, phi, LARGEST_SHIFT + LAST_SHIFTS[0], spacing)
     own = added(inner, nodal_water(near, 0.0, phi, topology.parts, n))
     slope = _volume_slope(topology, near, phi, spacing, seen)
@@ -332,11 +331,11 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     for most in LAST_SHIFTS:
         if most > LAST_SHIFTS[0]:
             inner, near = _parted(topology, seen, phi, LARGEST_SHIFT + most, spacing)
-        left = target - float(inner.sum())
-        shifted, of_near, reinserted = met_total(
+        left = target - total(inner)
+        shifted, of_near, volume, reinserted = met_total(
             topology, near, moved, (band, slope, shift), (carried, inner, left), tolerance, most, spacing
         )
-        if abs(left - float(of_near.sum())) <= tolerance:
+        if abs(left - volume) <= tolerance:
             break
     if drain_films(shifted, spacing):
         of_near = nodal_water(near, 0.0, shifted, topology.parts, n)

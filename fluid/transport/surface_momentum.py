@@ -57,7 +57,7 @@ from fluid.surface.volume import Flux, Shift, diffused_shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
 from kernels.decorators import inner, ranged, released
-from kernels.threads import over, zeros
+from kernels.threads import found_over, over, zeros
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""
@@ -107,7 +107,8 @@ class Carried:
             for _ in range(RINGS):
                 before, weight = weight, copied(weight)
                 over(_wider, n, flux.nodes, edges, before, weight)
-        fast, n_fast = by_speed(flux.nodes, velocity, gravity, viscosity, spacing)
+        fast = zeros((size,))
+        n_fast = by_speed(flux.nodes, velocity, gravity, viscosity, spacing, fast)
         if not jumps and not n_fast:
             volume, moved = carry_volume(flux, dt)
             return cls(volume), moved
@@ -148,13 +149,11 @@ class Carried:
         return jumps
 
 
-def by_speed(nodes, velocity, gravity: float, viscosity: float, spacing) -> tuple[Array, int]:
-    """w (N,) in fast water at the listed nodes, zero elsewhere, and at how many it is not zero.
+def by_speed(nodes, velocity, gravity: float, viscosity: float, spacing, weight) -> int:
+    """w in fast water at the listed nodes, in `weight` (N,), and at how many it is not zero.
 
     velocity (N, 3) [m/s] · gravity [m/s²] · viscosity: kinematic [m²/s] · spacing (N,) [m]: size of the cells"""
-    weight = zeros((len(velocity),))
-    some = sum(over(_by_speed, len(nodes), nodes, velocity, gravity, viscosity, spacing, weight))
-    return weight, some
+    return sum(over(_by_speed, len(nodes), nodes, velocity, gravity, viscosity, spacing, weight))
 
 
 @ranged
@@ -189,22 +188,42 @@ def _pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> N
     gained: m_i = first - second + third (N,) [m³] · share (N,) of its rest that is passed on · water, capacity (N,)
     [m³]: what the nodes hold before, and could hold."""
     n, edges, spacing = len(water), graph.edges, shift.spacing
-    holds = water[shift.band] > NO_WATER * capacity[shift.band]
-    band, moved = shift.band[holds], np.empty(len(graph.neighbour))
-    chi, inside, came = zeros((n,)), np.zeros(n, bool), np.zeros(n)
-    chi[band], inside[band] = shift.kappa * shift.value[holds], True
+    chi, inside, came, moved = np.empty(n), np.zeros(n, bool), np.empty(n), np.empty(len(graph.neighbour))
+    state = (water, capacity, shift.kappa, shift.value)
+    band = found_over(_holding, len(shift.band), shift.band, *state, chi, inside, came)
     over(_passed, len(band), band, edges, chi, inside, spacing, water, moved)
     carry_velocity(band, edges, moved, (water, capacity), u, came)
     sought = np.empty(len(band))
     if not sum(over(_sought, len(band), band, gained, share, came, sought)):
         return
     place = places_of(band, n)
-    stiffness, anchor = np.empty(len(edges.stiffness)), np.empty(len(band))
-    over(_through_water, len(band), band, edges, spacing, water, capacity, (stiffness, anchor))
-    edges, left = edges._replace(stiffness=stiffness), np.maximum(water + came, 0.0)
-    chi[band] = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
+    stiffness, anchor, left = np.empty(len(edges.stiffness)), np.empty(len(band)), np.empty(n)
+    over(_through_water, len(band), band, edges, spacing, water, capacity, came, (stiffness, anchor, left))
+    edges = edges._replace(stiffness=stiffness)
+    rest = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
+    over(_put, len(band), band, rest, chi)
     over(_passed, len(band), band, edges, chi, inside, spacing, left, moved)
     carry_velocity(band, edges, moved, (left, capacity), u)
+
+
+@released
+def _holding(first, last, band, water, capacity, kappa, value, chi, inside, came):
+    """Those nodes of the band that hold water, in order, at which χ of (2), inside and came (N,) are set."""
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
+        i = band[s]
+        if water[i] > NO_WATER * capacity[i]:
+            chi[i], inside[i], came[i] = kappa * value[s], True, 0.0
+            found[n] = i
+            n += 1
+    return found[:n].copy()
+
+
+@ranged
+def _put(first, last, nodes, values, field):
+    """field (N,) ← values (n,) at the listed nodes."""
+    for s in range(first, last):
+        field[nodes[s]] = values[s]
 
 
 @released
@@ -221,10 +240,10 @@ def _sought(first, last, band, gained, share, came, out):
 
 
 @ranged
-def _through_water(first, last, band, edges, spacing, water, capacity, made):
+def _through_water(first, last, band, edges, spacing, water, capacity, came, made):
     """made: K (edges,) times the least share of CONDUCTING that both ends hold of what they could; ANCHOR times the sum
-    of it times h (n,)."""
-    stiffness, anchor = made
+    of it times h (n,); and the water that is left at the band (N,) [m³] with what came to it."""
+    stiffness, anchor, left = made
     for r in range(first, last):
         i, total = band[r], 0.0
         own = water[i] / max(
@@ -235,13 +254,13 @@ def _through_water(first, last, band, edges, spacing, water, capacity, made):
             least = min(own, max(water[j], 0.0) / max(capacity[j], 1e-300))
             stiffness[s] = edges.stiffness[s] * min(least / CONDUCTING, 1.0)
             total -= 0.5 * (spacing[i] + spacing[j]) * stiffness[s]
-        anchor[r] = ANCHOR * total
+        anchor[r], left[i] = ANCHOR * total, max(water[i] + came[i], 0.0)
 
 
 @ranged
 def _passed(first, last, band, edges, chi, inside, spacing, water, moved):
     """Volumes (edges,) [m³] of (2) or (3) out of each node of the band, where both hold water; none gives more than it
-    holds. χ (N,), inside (N,) bool: where the band holds water."""
+    holds. inside (N,) bool: where the band holds water · χ (N,), read there."""
     start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
     for place in range(first, last):
         i = band[place]

@@ -26,10 +26,10 @@ import numpy as np
 
 from fluid.domain.layers import WORK
 from fluid.domain.moments import part_moments
-from fluid.numerics.fields import copied
+from fluid.numerics.fields import copied, nothing
 from fluid.surface.volume import Flux, edge_rates
 from kernels.decorators import ranged, released
-from kernels.threads import found_over, over, owning, reach_of_rows, zeros
+from kernels.threads import found_over, over, owning, reach_of_rows, taken, zeros
 
 NEAR = 3.0
 """|φ| in cell sizes beyond which no node has a hat that the surface gets to in a step."""
@@ -48,20 +48,19 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     went out along each edge. Where no surface is slow enough, only the nodes are visited."""
     t, g = topology, flux.graph
     weight, counted = zeros((len(phi),)), np.zeros(len(phi), bool)
-    over(_weights, len(flux.nodes), flux.nodes, phi, u, t.node_size, dt, weight, counted)
-    if not counted.any():
-        return np.zeros(len(phi))
+    some = any(over(_weights, len(flux.nodes), flux.nodes, phi, u, t.node_size, dt, weight, counted))
+    if not some:
+        return nothing(len(phi))
     around = t.cells_around(counted)
     velocity, beside = np.empty(flux.velocity.shape), np.zeros(len(phi), bool)
     reached = found_over(
         _in_reach, len(around), around, phi, t.node_size, t.cells, flux.velocity, velocity, beside
     )
-    after, near = copied(phi), np.flatnonzero(beside)
+    after, near = copied(phi), taken(beside)
     state = ((counted, flux.velocity, velocity), phi, u, dt, t.paths, t.volume)
     over(_after, len(near), near, *state, after, weight=WORK)
-    beside[:] = False
     over(_by_share, len(reached), reached, phi, after, t.parts, flux.velocity, velocity, beside)
-    nodes = flux.nodes[beside[flux.nodes]]
+    nodes = found_over(_those_in, len(flux.nodes), flux.nodes, beside)
     rate = edge_rates(t, g, nodes, velocity)
     out, reach = zeros((len(phi),)), reach_of_rows(nodes, g.row, g.start, g.neighbour)
     state = (nodes, beside, weight, g.edges, (dt, rate), moved)
@@ -71,12 +70,27 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
 
 @ranged
 def _weights(first, last, nodes, phi, u, size, dt, weight, counted):
-    """Weight (N,) of what the surface sweeps at the listed nodes; counted (N,) bool: those of some near the surface."""
+    """Weight (N,) of what the surface sweeps at the listed nodes; counted (N,) bool: those of some near the surface;
+    → whether there are any."""
+    some = False
     for s in range(first, last):
         i = nodes[s]
         speed = np.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         weight[i] = min(1.0, max(0.0, (SLOW[1] - dt * speed / size[i]) / (SLOW[1] - SLOW[0])))
         counted[i] = weight[i] > 0.0 and abs(phi[i]) < NEAR * size[i]
+        some = some or counted[i]
+    return some
+
+
+@released
+def _those_in(first, last, nodes, some):
+    """Those of the listed nodes that are in a set (N,) bool, in order."""
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
+        if some[nodes[s]]:
+            found[n] = nodes[s]
+            n += 1
+    return found[:n].copy()
 
 
 @released

@@ -46,7 +46,8 @@ def test_water_bears_as_much_as_follows_the_momentum_of_the_volume():
     for speed, share in ((0.999, 0.0), (2.0, 0.5), (4.0, 1.0)):
         own, u = np.zeros(water.velocity.shape), np.zeros(water.velocity.shape)
         own[:, 0] = speed * shallow
-        fast, some = by_speed(outside, own, 9.81, 0.0, size)
+        fast = np.empty(len(wet))
+        some = by_speed(outside, own, 9.81, 0.0, size, fast)
         Borne(water.topology, outside, wet, W, fast, None).give(own, u)
         assert some == (len(outside) if share else 0)
         assert W @ u[:, 0] == pytest.approx(share * speed * held, rel=1e-12)

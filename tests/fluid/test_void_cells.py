@@ -48,4 +48,4 @@ def test_a_part_that_lies_on_no_body_holds_water_where_a_corner_of_it_is_below_t
         corners = domain.fan_corners[domain.fan_start[cell] : domain.fan_start[cell + 1]]
         expected.append((corners @ phi[domain.cells[cell]]).min() < dry)
     assert 5 < sum(expected) < len(expected) - 5
-    np.testing.assert_array_equal(holds[bare], expected)
+    np.testing.assert_array_equal(holds[domain.part[bare]], expected)

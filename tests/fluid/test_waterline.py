@@ -6,6 +6,7 @@ import pytest
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
 from fluid.mesh.background import box_mesh
 from fluid.pressure.waterline import WaterlineLoad
 from tests.fluid.scenes import advance, load, rotation, tank
@@ -71,4 +72,5 @@ def test_solids_wholly_under_water_need_no_correction():
     domain = cut_domain(mesh, boxes([0.5, 0.5, 0.3]))
     phi = domain.nodes[:, 2] - 0.9
     faces, none, no_side = np.arange(len(domain.face_cell)), np.zeros(0, int), np.zeros(len(phi), bool)
-    assert not WaterlineLoad(domain, faces, none, phi, phi < 0.0, -WEIGHT * phi, no_side).before().any()
+    state = (faces, none, phi, phi < 0.0, -WEIGHT * phi, no_side)
+    assert not WaterlineLoad(Topology.of(mesh, domain), domain, *state).before().any()
