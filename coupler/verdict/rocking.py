@@ -23,29 +23,13 @@ def rocking(structure: Structure, out: Array, reach: Array) -> Array:
 
     out (n,) bool: blocks whose centre is out of its place now · reach (n,) [m]: farthest that a corner of each block
     may have moved and still be in its place."""
-    found, out = np.zeros(structure.n, bool), out & ~structure.fixed
+    out = out & ~structure.fixed
     if not out.any():
-        return found
-    up, centre, label = _up(structure), structure.centre(), _pieces(structure)
-    way, rises = _ways(structure, centre, label, up)
-    for piece in np.flatnonzero(rises & (np.bincount(label[out], minlength=len(rises)) > 0)).tolist():
-        rows = np.flatnonzero((label == piece) & ~structure.fixed)
-        placed = centre, structure.rotation()
-        found[rows] = out[rows] & _turns_back(structure, rows, reach, placed, way[piece], up)
-    return found
-
-
-def _ways(structure: Structure, centre: Array, label: Array, up: Array) -> tuple[Array, Array]:
-    """Way (pieces, 3) [m] of the centre of mass of each piece, from centre (n, 3) [m] and label (n,), and whether it
-    has risen (pieces,) bool: most pieces of a building that has come down have not, and need no further look."""
-    start = np.array([block.centre for block in structure.blocks]).reshape(-1, 3)
-    mass = np.where(structure.fixed, 0.0, structure.mass)
-    moved = (mass[:, None] * (centre - start)).T
-    whole = np.bincount(label, mass)
-    way = (
-        np.stack([np.bincount(label, m) for m in moved], axis=1) / np.where(whole > 0.0, whole, 1.0)[:, None]
-    )
-    return way, way @ up > 0.0
+        return out
+    label = _pieces(structure)
+    pieces = np.zeros(int(label.max()) + 1, bool)
+    pieces[label[out]] = True
+    return out & _turning_back(structure, label, pieces, reach)[label]
 
 
 def _up(structure: Structure) -> Array:
@@ -71,26 +55,35 @@ def _pieces(structure: Structure) -> Array:
     return connected_components(graph, directed=False)[1]
 
 
-def _turns_back(
-    structure: Structure, rows: Array, reach: Array, placed: tuple[Array, Array], way: Array, up: Array
-) -> bool:
-    """Whether a corner of the base of the piece `rows` is in its place, and its centre of mass, which has risen, before
-    the last of those. placed: centres and rotations of all blocks · way (3,) [m] of its centre of mass."""
-    centre, rotation = placed
-    along = way - (way @ up) * up
-    size = float(np.linalg.norm(along))
-    if size == 0.0:
-        return False
-    blocks = [structure.blocks[i] for i in rows]
-    mass = structure.mass[rows]
-    mean = mass @ centre[rows] / mass.sum()
-    corners = [block.world_vertices() for block in blocks]
-    now = [centre[i] + np.asarray(b.vertices) @ rotation[i].T for i, b in zip(rows, blocks)]
-    least = min(float((x @ up).min()) for x in corners)
-    pivots = []
-    for i, before, after in zip(rows, corners, now):
-        base = before @ up <= least + reach[i]
-        kept = base & (np.linalg.norm(after - before, axis=1) <= reach[i])
-        pivots.append(after[kept])
-    edge = np.concatenate(pivots) @ (along / size)
-    return bool(len(edge)) and float(mean @ along) / size < float(edge.max())
+def _turning_back(structure: Structure, label: Array, pieces: Array, reach: Array) -> Array:
+    """(p,) bool: which of the `pieces` (p,) bool have a corner of their base in its place, and their centre of mass,
+    which has risen, before the last of those. label (n,): piece of each block."""
+    up, centre, rotation = _up(structure), structure.centre(), structure.rotation()
+    start = np.array([block.centre for block in structure.blocks])
+    mass = np.where(structure.fixed, 0.0, structure.mass)
+    mean, way = _means(label, mass, centre), _means(label, mass, centre - start)
+    along = way - (way @ up)[:, None] * up
+    size = np.linalg.norm(along, axis=1)
+    along /= np.where(size > 0.0, size, 1.0)[:, None]
+    looked_at = pieces & (way @ up > 0.0) & (size > 0.0)
+    rows = np.flatnonzero(looked_at[label] & ~structure.fixed)
+    if not len(rows):
+        return looked_at
+    before = np.concatenate([structure.blocks[i].world_vertices() for i in rows])
+    vertices = [np.asarray(structure.blocks[i].vertices) for i in rows]
+    block = np.repeat(rows, [len(v) for v in vertices])
+    now = centre[block] + np.einsum("kij,kj->ki", rotation[block], np.concatenate(vertices))
+    piece, height = label[block], before @ up
+    least, last = np.full(len(pieces), np.inf), np.full(len(pieces), -np.inf)
+    np.minimum.at(least, piece, height)
+    kept = height <= least[piece] + reach[block]
+    kept &= np.linalg.norm(now - before, axis=1) <= reach[block]
+    np.maximum.at(last, piece[kept], np.einsum("ki,ki->k", now[kept], along[piece[kept]]))
+    return looked_at & (np.einsum("pi,pi->p", mean, along) < last)
+
+
+def _means(label: Array, mass: Array, places: Array) -> Array:
+    """Means (p, 3) [m] of places (n, 3) over each piece by mass (n,); zero for pieces without mass."""
+    whole = np.bincount(label, mass)
+    sums = np.stack([np.bincount(label, mass * x) for x in places.T], axis=1)
+    return sums / np.where(whole > 0.0, whole, 1.0)[:, None]
