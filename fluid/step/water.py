@@ -276,7 +276,7 @@ class Water:
         water parts where x is at its bound, None: nowhere (`bounded.py`)."""
         new: Corrected = corrected(self, problem, np.asarray(x), parting)
         late = self._late(problem.dt)
-        before = self._rates() if late > 0.0 else None
+        before, held = (self._rates(), self.kinetic_energy()) if late > 0.0 else (None, 0.0)
         given = 0.0
         if self.sides is not None:
             given = self.sides.given(
@@ -308,11 +308,9 @@ class Water:
         ahead = 0.0
         if before is not None:
             power, through = self._rates()
-            of_surface = late
-            if problem.coupling.nnz > 0 and self.pushed_by.any():
-                # calm water that bodies push moves with what they displace
-                of_surface *= 1.0 - self.calm(problem.dt)
-            self._late_energy += of_surface * (power - before[0])
+            # calm water that bodies push moves with what they displace
+            pushed = self.calm(problem.dt) * self._pushed(problem, self.kinetic_energy() - held)
+            self._late_energy += (1.0 - pushed) * late * (power - before[0])
             if self.sides is not None:
                 ahead = late * float((through - before[1]) @ self.pressure)
         if self.sides is not None:
@@ -332,6 +330,14 @@ class Water:
         """Power of gravity [W], and what the velocity drives through seas (N,) [m³/s]."""
         through = 0.0 if self.sides is None else self.sides.sea_rate(self.level_set, self.velocity)
         return float(self.momentum() @ self.parameters.weight), through
+
+    def _pushed(self, problem: PressureProblem, gained: float) -> float:
+        """Share of the energy gained [J] in a step, at most 1, that bodies have given: the work of the pressure on
+        them."""
+        if problem.coupling.nnz == 0 or not self.pushed_by.any():
+            return 0.0
+        given = problem.dt * abs(float(self.pressure @ (self.coupling @ self.pushed_by.ravel())))
+        return min(1.0, given / max(abs(gained), 1e-300))
 
     def snapshot(self) -> dict:
         """The present state, for `restore`: references, since a step replaces the arrays that it changes."""
