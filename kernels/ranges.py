@@ -32,6 +32,8 @@ I32, I64 = ir.IntType(32), ir.IntType(64)
 POINTER = ir.IntType(8).as_pointer()
 MOST = 1024
 """Largest number of parts."""
+SHARED = ".shared"
+"""What the name of an entry has more than that of its kernel."""
 
 
 class _Places(NamedTuple):
@@ -112,8 +114,9 @@ def _entry(context, module, kernel, fndesc) -> ir.Function:
     """A function that is called like the kernel, and shares it among threads if it is asked to."""
     pack = _Pack(kernel)
     body = _body(context, module, kernel, fndesc, pack)
-    entry = ir.Function(module, kernel.function_type, fndesc.llvm_func_name + ".shared")
+    entry = ir.Function(module, kernel.function_type, fndesc.llvm_func_name + SHARED)
     _leave_as_it_is(entry)
+    entry.linkage = "external"  # for `kernels/in_a_row.py`
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
     result, error, first, last = entry.args[:4]
     with builder.if_then(builder.icmp_signed(">=", first, _constant(0)), likely=True):

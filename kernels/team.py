@@ -62,7 +62,7 @@ def _pointer(builder, address):
 
 
 @intrinsic
-def _load(typingctx, address):
+def loaded(typingctx, address):
     """The number at an address, and all that was written before it was stored there."""
 
     def code(context, builder, signature, args):
@@ -72,7 +72,9 @@ def _load(typingctx, address):
 
 
 @intrinsic
-def _store(typingctx, address, value):
+def stored(typingctx, address, value):
+    """Store a number at an address, after all that was written before."""
+
     def code(context, builder, signature, args):
         builder.store_atomic(args[1], _pointer(builder, args[0]), "seq_cst", 8)
         return context.get_dummy_value()
@@ -140,7 +142,7 @@ def _pause(typingctx):
 def _now(clock):
     """Nanoseconds of a clock that only goes forward; clock: address of room for two numbers."""
     _clock(MONOTONIC, clock)
-    return 1_000_000_000 * _load(clock) + _load(clock + 8)
+    return 1_000_000_000 * loaded(clock) + loaded(clock + 8)
 
 
 @inner
@@ -148,11 +150,11 @@ def _look(place, value, spin, clock):
     """Look at a place until something else than `value` is there, for at most `spin` nanoseconds, and no longer once
     others have used the core meanwhile: where there are more of them than cores, looking takes time from them."""
     for _ in range(BETWEEN):
-        if _load(place) != value:
+        if loaded(place) != value:
             return
         _pause()
     begun = _now(clock)
-    while _load(place) == value:
+    while loaded(place) == value:
         passed = _now(clock) - begun
         if passed > spin:
             return
@@ -161,7 +163,7 @@ def _look(place, value, spin, clock):
             if _now(clock) - begun - passed > CROWDED:
                 return
         for _ in range(BETWEEN):
-            if _load(place) != value:
+            if loaded(place) != value:
                 return
             _pause()
 
@@ -171,24 +173,24 @@ def _serve(box, spin):
     """Do what is put into a box, until it is Python code (→ True) or the thread is to end (→ False)."""
     while True:
         _look(box, IDLE, spin, box + 8 * CLOCK)
-        if _load(box) == OVER:
+        if loaded(box) == OVER:
             return False
         if _replace(box, GIVEN, BEGUN):
-            plan = _load(box + 8 * PLAN)
-            body = _load(plan + 8 * Plan.body)
+            plan = loaded(box + 8 * PLAN)
+            body = loaded(plan + 8 * Plan.body)
             if body == 0:
                 return True
-            _work(plan, body, _load(box + 8 * PART), _load(plan + 8 * Plan.pack))
+            _work(plan, body, loaded(box + 8 * PART), loaded(plan + 8 * Plan.pack))
             _finish(box)
         elif _replace(box, IDLE, ASLEEP):
-            while _load(box) == ASLEEP:
+            while loaded(box) == ASLEEP:
                 _wait(box + 8 * WAKE)
 
 
 @inner
 def _work(plan, body, part, pack):
     """Do a part, and others for as long as there are any."""
-    parts = _load(plan + 8 * Plan.parts)
+    parts = loaded(plan + 8 * Plan.parts)
     while part < parts:
         _call(body, part, pack)
         part = _taken(plan + 8 * Plan.next)
@@ -196,7 +198,7 @@ def _work(plan, body, part, pack):
 
 @inner
 def _finish(box):
-    _store(box, IDLE)
+    stored(box, IDLE)
     if _swap(box + 8 * FINISHED, DONE) == AWAITED:
         _post(box + 8 * ANSWER)
 
@@ -210,15 +212,15 @@ def _finished(box):
 @inner
 def _give(plan, spin):
     """Put a part into each box: part k into that of thread k, of which the first is the one that calls."""
-    threads = _load(plan + 8 * Plan.threads)
-    _store(plan + 8 * Plan.next, threads)
+    threads = loaded(plan + 8 * Plan.threads)
+    stored(plan + 8 * Plan.next, threads)
     for k in range(1, threads):
-        box = _load(plan + 8 * (Plan.boxes + k - 1))
-        if _load(box) == BEGUN:  # of a call that Ctrl-C ended before it had waited
+        box = loaded(plan + 8 * (Plan.boxes + k - 1))
+        if loaded(box) == BEGUN:  # of a call that Ctrl-C ended before it had waited
             _await(plan, box, spin)
-        _store(box + 8 * PLAN, plan)
-        _store(box + 8 * PART, k)
-        _store(box + 8 * FINISHED, PENDING)
+        stored(box + 8 * PLAN, plan)
+        stored(box + 8 * PART, k)
+        stored(box + 8 * FINISHED, PENDING)
         if _swap(box, GIVEN) == ASLEEP:
             _post(box + 8 * WAKE)
 
@@ -228,23 +230,23 @@ def _await(plan, box, spin):
     """Wait until the thread of a box has done what it has begun."""
     _look(box + 8 * FINISHED, PENDING, spin, plan + 8 * Plan.clock)
     if _replace(box + 8 * FINISHED, PENDING, AWAITED):
-        while _load(box + 8 * FINISHED) != DONE:
+        while loaded(box + 8 * FINISHED) != DONE:
             _wait(box + 8 * ANSWER)
 
 
 @nogil
 def _begin(plan, spin):
     """Give parts that are Python code."""
-    _store(plan + 8 * Plan.body, 0)
+    stored(plan + 8 * Plan.body, 0)
     _give(plan, spin)
 
 
 @nogil
 def _took_back(plan, k):
     """Whether thread k has not begun its part, and shall not."""
-    box = _load(plan + 8 * (Plan.boxes + k - 1))
+    box = loaded(plan + 8 * (Plan.boxes + k - 1))
     if _replace(box, GIVEN, IDLE):
-        _store(box + 8 * FINISHED, DONE)
+        stored(box + 8 * FINISHED, DONE)
         return True
     return False
 
@@ -252,8 +254,8 @@ def _took_back(plan, k):
 @nogil
 def _end(plan, spin):
     """Wait for all parts that were given."""
-    for k in range(1, _load(plan + 8 * Plan.threads)):
-        _await(plan, _load(plan + 8 * (Plan.boxes + k - 1)), spin)
+    for k in range(1, loaded(plan + 8 * Plan.threads)):
+        _await(plan, loaded(plan + 8 * (Plan.boxes + k - 1)), spin)
 
 
 @nogil
@@ -269,16 +271,16 @@ def _run():
 
     @cfunc(types.void(types.int64, types.int64, types.int64), cache=True)
     def run(plan, body, pack):
-        _store(plan + 8 * Plan.body, body)
-        _store(plan + 8 * Plan.pack, pack)
+        stored(plan + 8 * Plan.body, body)
+        stored(plan + 8 * Plan.pack, pack)
         _give(plan, SPIN)
         _work(plan, body, 0, pack)
-        threads = _load(plan + 8 * Plan.threads)
+        threads = loaded(plan + 8 * Plan.threads)
         for k in range(threads - 1, 0, -1):
             if _took_back(plan, k):
                 _call(body, k, pack)
         for k in range(1, threads):
-            _await(plan, _load(plan + 8 * (Plan.boxes + k - 1)), SPIN)
+            _await(plan, loaded(plan + 8 * (Plan.boxes + k - 1)), SPIN)
 
     return run.address, run
 
@@ -368,6 +370,18 @@ class Team:
             self._at_work.release()
             raise
         return plan
+
+    def lead(self, driver: Callable, threads: int) -> None:
+        """Call driver(address of the plan, number of threads), which shares loops itself; (0, 1) while another caller
+        has the threads."""
+        plan = self._take(threads) if threads > 1 else None
+        if plan is None:
+            driver(0, 1)
+            return
+        try:
+            driver(ctypes.addressof(plan), threads)
+        finally:
+            self._at_work.release()
 
     def share(self, kernel: Callable, threads: int, parts: int, count: int, args: tuple) -> list | None:
         """What a kernel of a shared range returns for each of as many equal parts of 0 ... count, at least one for

@@ -29,6 +29,7 @@ import numpy as np
 
 from array_types import Array
 from kernels.decorators import inner, kernel, ranged, released
+from kernels.in_a_row import LOGGED, NOT_WATCHED, Crew
 from kernels.memory import OWN
 from kernels.ranges import MOST, is_shared
 from kernels.team import Team
@@ -106,6 +107,8 @@ def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int | N
     kernel: `ranged` or `released`, or Python code · weight: cost of a row, in usual rows, which take some ten
     nanoseconds · pieces: number of ranges for each thread, more than one for rows of unequal cost; None: PIECES where
     each range has enough rows, one for Python code."""
+    if _settings.size == 1 and _settings.calls is None:
+        return [kernel(0, count, *args)]
     shared = is_shared(kernel)
     parts = min(_parts(count * weight if shared else count * weight / PYTHON), max(count, 1))
     if parts == 1:
@@ -117,6 +120,16 @@ def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int | N
         return [kernel(0, count, *args)] if found is None else found
     ends = [count * k // parts for k in range(parts + 1)]
     return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
+
+
+def in_a_row(driver: Callable, *args) -> None:
+    """Call a compiled driver(crew, *args), whose loops are shared one after the other (`kernels/in_a_row.py`)."""
+    calls = _settings.calls
+    log = NOT_WATCHED if calls is None else np.zeros((LOGGED + 2, 2), np.int64)
+    _team.lead(lambda plan, threads: driver(Crew(plan, threads, _settings.least, log), *args), _settings.size)
+    if calls is not None:
+        times = 1e-9 * log[2 : 2 + log[0, 0]]
+        calls.extend(Call(driver.__name__, 0, begin, end - begin) for begin, end in times.tolist())
 
 
 def found_over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int | None = None) -> Array:
@@ -159,10 +172,24 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args, weight: 
     `first` to before `last`: the sums of chunks, which do not depend on the threads, are added in their order.
 
     weight: as in `over`."""
-    chunks = max(1, -(-count // CHUNK))
+    chunks = chunks_of(count)
     partial = np.zeros((chunks, math.prod(shape)))
     over(kernel, chunks, *args, partial.reshape(chunks, *shape), weight=weight * CHUNK, pieces=chunks)
     return np.add.accumulate(partial)[-1].reshape(shape)
+
+
+def chunks_of(count: int) -> int:
+    """Number of CHUNKs that 0 ... `count` has."""
+    return max(1, -(-count // CHUNK))
+
+
+@inner
+def added_up(partial):
+    """Sum of partial (c,) in its order: `summed` in compiled code."""
+    total = partial[0]
+    for c in range(1, len(partial)):
+        total += partial[c]
+    return total
 
 
 def marked(mask) -> Array:

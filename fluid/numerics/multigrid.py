@@ -19,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Floats, Integers
-from kernels.decorators import kernel, plain, ranged, released
-from kernels.threads import over
+from kernels.decorators import kernel, nogil, plain, ranged, released
+from kernels.in_a_row import done, handed, through
+from kernels.threads import in_a_row, over
 
 PAIRINGS = 3
 """Pairs of pairs of pairs: about eight unknowns become one."""
@@ -107,39 +108,24 @@ class Multigrid:
         return self._cycle(0, r)
 
     def _cycle(self, depth: int, r):
+        """M⁻¹ r (n,) of a level and those below it; large levels go by blocks."""
         if depth == len(self.levels):
             return self._at_the_bottom(r)
         at = self.levels[depth]
         below = self.levels[depth + 1] if depth + 1 < len(self.levels) else self._last
-        if len(at.diagonal) < 2 * BLOCK:
-            x, coarse = self._down(at, len(below.diagonal), r)
-            coarse = self._cycle(depth + 1, coarse)
-            _up(at.start, at.column, at.entry, at.inverse, at.aggregate, coarse, r, x)
-            return x
-        return self._by_blocks(depth, at, len(below.diagonal), r)
-
-    def _down(self, at: Level, n_coarse: int, r):
-        """Forward sweep from zero as one block → x, and Pᵀ (r - A x)."""
-        n = len(r)
-        if n < SHARED:
-            return _down(at.start, at.middle, at.column, at.entry, at.inverse, at.aggregate, n_coarse, r)
-        (x, left), coarse = np.empty((2, n)), np.empty(n_coarse)
-        _from_zero(at.start, at.middle, at.column, at.entry, at.inverse, r, x)
-        over(_right_over, n, at, x, left, weight=ROW)
-        over(_restricted, n_coarse, at.first, at.member, left, coarse, weight=AGGREGATE)
-        return x, coarse
-
-    def _by_blocks(self, depth: int, at: Level, n_coarse: int, r):
-        """`_cycle` on a large level."""
-        bounds, (x, before, left) = self._blocks[depth], np.empty((3, len(r)))
-        coarse = np.empty(n_coarse)
-        count, work = len(bounds) - 1, BLOCK
-        over(_down_blocks, count, bounds, at, r, x, weight=work, pieces=count)
-        over(_left_over, count, bounds, at, x, left, weight=work, pieces=count)
-        over(_restricted, n_coarse, at.first, at.member, left, coarse, weight=AGGREGATE)
+        n, n_coarse, bounds = len(r), len(below.diagonal), self._blocks[depth]
+        rows = (at.start, at.column, at.entry, at.inverse, at.aggregate)
+        whole = len(bounds) == 2
+        if whole and n < SHARED:
+            x, coarse = _down(*rows, at.middle, n_coarse, r)
+        else:
+            (x, spare), coarse = np.empty((2, n)), np.empty(n_coarse)
+            in_a_row(_shared_down, bounds, at, r, x, spare, coarse)
         coarse = self._cycle(depth + 1, coarse)
-        over(_onto, len(r), at.aggregate, coarse, x, before)
-        over(_up_blocks, count, bounds, at, r, before, x, weight=work, pieces=count)
+        if whole:
+            _up(*rows, coarse, r, x)
+        else:
+            in_a_row(_shared_up, bounds, at, coarse, r, spare, x)
         return x
 
     def _at_the_bottom(self, r):
@@ -349,8 +335,34 @@ def _right_over(first, last, at, x, left):
         left[i] = total
 
 
+@nogil
+def _shared_down(crew, bounds, at, r, x, left, coarse):
+    """Forward sweep from zero, as one block or by blocks → x, and Pᵀ (r - A x); left (n,): r - A x."""
+    n, count, n_coarse = len(r), len(bounds) - 1, len(coarse)
+    if count == 1:
+        _from_zero(at.start, at.middle, at.column, at.entry, at.inverse, r, x)
+        through(_right_over, handed(crew, n, ROW, 1), n, (at, x, left))
+    else:
+        through(_down_blocks, handed(crew, count, BLOCK, count), count, (bounds, at, r, x))
+        done(crew)
+        through(_left_over, handed(crew, count, BLOCK, count), count, (bounds, at, x, left))
+    done(crew)
+    through(_restricted, handed(crew, n_coarse, AGGREGATE, 1), n_coarse, (at.first, at.member, left, coarse))
+    done(crew)
+
+
+@nogil
+def _shared_up(crew, bounds, at, coarse, r, before, x):
+    """x + P coarse, then backward sweeps of blocks, in place; before (n,): work space."""
+    n, count = len(r), len(bounds) - 1
+    through(_onto, handed(crew, n, 1.0, 1), n, (at.aggregate, coarse, x, before))
+    done(crew)
+    through(_up_blocks, handed(crew, count, BLOCK, count), count, (bounds, at, r, before, x))
+    done(crew)
+
+
 @kernel
-def _down(start, middle, column, entry, inverse, aggregate, n_coarse, r):
+def _down(start, column, entry, inverse, aggregate, middle, n_coarse, r):
     """Forward sweep from zero → x, and Pᵀ (r - A x), for which only the entries right of the diagonal are needed."""
     n = len(r)
     x, coarse = np.empty(n), np.zeros(n_coarse)

@@ -6,6 +6,7 @@ solver` compares it with others on pressure systems.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -90,20 +91,23 @@ def conjugate_gradients(
     scale = np.linalg.norm(b) or 1.0
     free = _all if held is None else partial(_without, held)
     r = free(b - apply(x))
-    history = [np.linalg.norm(r) / scale]
+    history = [_length(r) / scale]
     p = rz = None
     while not history[-1] <= rtol:
         if len(history) > most or not np.isfinite(history[-1]):
             raise _failure("did not converge", history, rtol, r)
         z = free(precondition(r))
         rz, rz_before = r @ z, rz
-        p = z if p is None else _onward(z, rz / rz_before, p)
+        if p is None:
+            p = z
+        else:
+            over(_turn, len(p), z, rz / rz_before, p)
         Ap = free(apply(p))
         curvature = p @ Ap
         if curvature <= 0.0:
             raise _failure(f"met a direction of curvature {curvature:.3g} ≤ 0", history, rtol, p)
         over(_advance, len(x), rz / curvature, p, Ap, x, r)
-        history.append(np.linalg.norm(r) / scale)
+        history.append(_length(r) / scale)
         if enough is not None and enough(x, history[-1]):
             break
     return SolveResult(x, len(history) - 1, history[-1])
@@ -119,17 +123,16 @@ def _without(held, v):
     return v
 
 
-def _onward(z, share, p):
-    """z + share p (n,)."""
-    out = np.empty(len(z))
-    over(_sum, len(z), z, share, p, out)
-    return out
+def _length(v) -> float:
+    """np.linalg.norm of v (n,), to the bit."""
+    return math.sqrt(v @ v)
 
 
 @ranged
-def _sum(first, last, z, share, p, out):
+def _turn(first, last, z, share, p):
+    """z + share p (n,) in the place of p."""
     for i in range(first, last):
-        out[i] = z[i] + share * p[i]
+        p[i] = z[i] + share * p[i]
 
 
 @ranged

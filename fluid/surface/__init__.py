@@ -3,6 +3,7 @@
 level_set                     signed distance near the surface
 closest_triangles             distances of nodes from the triangles of a surface
 volume                        the conservative volume, its fluxes, and the level set corrected towards it
+shift                         the shift of the surface that a volume asks for
 last_shift                    what the total volume is off by after that
 pools                         water that is connected
 cavities                      air on walls that the water has left

@@ -27,7 +27,6 @@ corrected by a last shift (`last_shift.py`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,12 +36,13 @@ from fluid.domain.cell_vectors import CellVectors
 from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import PAIR, Graph
-from fluid.numerics.fields import PLAIN, accumulate, added, copied, marks_of, places_of
+from fluid.numerics.fields import added, copied, marks_of, places_of
 from fluid.numerics.sums import total
 from fluid.surface.last_shift import LAST_SHIFTS, lower, met_total
 from fluid.surface.level_set import drain_films
-from kernels.decorators import kernel, ranged, released
-from kernels.threads import CHUNK, found_over, over, owning, owns_any, reach_of_cells, summed
+from fluid.surface.shift import diffused_shift
+from kernels.decorators import ranged, released
+from kernels.threads import found_over, over, owning, owns_any, reach_of_cells
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
@@ -51,8 +51,6 @@ VOLUME_TOLERANCE = 1e-6
 AHEAD, SAME_STEP = 2.0, 1e-9
 """Most steps like the last one for which its change of the velocity goes on in one; difference of two steps over their
 length that counts as round-off."""
-DIVIDED = 0.3
-"""Cost of a row of a vector that is divided by the diagonal, in usual rows."""
 _PROBE = 0.05
 """Half width of the band of (2), limit of its shift and step of the difference for c, in cell sizes; share of V/h added
 to c, so that regions without surface stay where they are; relative tolerance of the total volume."""
@@ -170,123 +168,6 @@ def edge_rates(topology, graph, listed, u_cell):
     mesh = (t.nodes, t.fluid_cells, t.products, (t.node_start, t.node_cells))
     over(_edge_rates, len(listed), listed, graph.edges, u_cell, *mesh, rate, weight=WORK)
     return rate
-
-
-def diffused_shift(band, place, edges, c, residual, kappa, spacing, tolerance, most):
-    """Equation (2) on the band nodes (n,) by conjugate gradients with the diagonal as preconditioner, (n,).
-
-    place (N,): their places in the band, -1 elsewhere · κ = kappa times the spacing (N,) [m] · at most `most`
-    iterations, until the residual has fallen by the tolerance."""
-    n, diagonal = len(band), c.copy()
-    first = np.zeros(n + 1, np.uint32)
-    over(_length_of_rows, n, band, place, edges, first[1:])
-    accumulate(first)
-    made = MadeRows(first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
-    over(_rows_of_shift, n, band, place, edges, kappa, spacing, made)
-    return _shift(first, made.column, made.entry, diagonal, residual, tolerance, most)
-
-
-class MadeRows(NamedTuple):
-    """The matrix c + κ K that is filled: first (n + 1,) entry of each row, column, entry, diagonal (n,)."""
-
-    first: np.ndarray
-    column: np.ndarray
-    entry: np.ndarray
-    diagonal: np.ndarray
-
-
-@ranged
-def _length_of_rows(begin, end, band, place, edges, found):
-    """Edges of stiffness within the band (n,) of each of its nodes."""
-    graph_row, start, neighbour, stiffness = edges
-    for r in range(begin, end):
-        row = graph_row[band[r]]
-        for s in range(start[row], start[row + 1]):
-            if place[neighbour[s]] >= 0 and stiffness[s] != 0.0:
-                found[r] += 1
-
-
-@ranged
-def _rows_of_shift(begin, end, band, place, edges, kappa, spacing, made):
-    """κ K of the edges within the band, and c + Σ κ K on the diagonal, in place."""
-    graph_row, start, neighbour, stiffness = edges
-    first, column, entry, diagonal = made
-    for r in range(begin, end):
-        row, k = graph_row[band[r]], first[r]
-        for s in range(start[row], start[row + 1]):
-            q = place[neighbour[s]]
-            if q >= 0 and stiffness[s] != 0.0:
-                column[k] = q
-                both = kappa * spacing[band[r]] + kappa * spacing[neighbour[s]]
-                entry[k] = 0.5 * both * stiffness[s]
-                diagonal[r] -= entry[k]
-                k += 1
-
-
-def _shift(first, column, entry, diagonal, residual, tolerance, most):
-    """x (n,) of the rows first[r]:first[r + 1] of (column, entry) with their diagonal, which is overwritten."""
-    n = len(diagonal)
-    x, r, z, Ap = np.zeros(n), residual.copy(), np.empty(n), np.empty(n)
-    rz = _first_way(diagonal, r, z)
-    goal, p = tolerance * tolerance * rz, z.copy()
-    for _ in range(most):
-        if rz <= goal or rz <= 0.0:
-            break
-        alpha = rz / float(summed(_product, n, (), first, column, entry, diagonal, p, Ap))
-        new = float(summed(_stepped, n, (), alpha, diagonal, Ap, r, z, weight=DIVIDED))
-        # as much of the last step as a line to the goal would take: taken as a whole, one step more or less by the last
-        # digit of r·z changes x by the tolerance
-        taken = alpha if new >= goal else alpha * (rz - goal) / (rz - new)
-        over(_turned, n, taken, z, new / rz, x, p, weight=PLAIN)
-        rz = new
-    return x
-
-
-@kernel
-def _first_way(diagonal, r, z):
-    """z = r/diagonal in place → r·z."""
-    typical = diagonal.mean() if len(diagonal) > 0 else 1.0
-    for i in range(len(diagonal)):
-        if diagonal[i] <= 1e-9 * typical:  # nothing to shift there and nobody to pass it to
-            diagonal[i], r[i] = typical, 0.0
-        z[i] = r[i] / diagonal[i]
-    return np.dot(r, z)
-
-
-@ranged
-def _product(begin, end, first, column, entry, diagonal, p, Ap, partial):
-    """A p (n,), and p·A p."""
-    for c in range(begin, end):
-        dot = 0.0
-        for r in range(c * CHUNK, min((c + 1) * CHUNK, p.shape[0])):
-            total = diagonal[r] * p[r]
-            for s in range(first[r], first[r + 1]):
-                total += entry[s] * p[column[s]]
-            Ap[r] = total
-            dot += p[r] * total
-        partial[c] = dot
-
-
-@ranged
-def _stepped(begin, end, share, diagonal, Ap, r, z, partial):
-    """r - share Ap and z = r/diagonal of conjugate gradients, in place, and r·z."""
-    for c in range(begin, end):
-        dot = 0.0
-        for k in range(c * CHUNK, min((c + 1) * CHUNK, r.shape[0])):
-            i = np.uint64(k)
-            r[i] -= share * Ap[i]
-            z[i] = r[i] / diagonal[i]
-            dot += r[i] * z[i]
-        partial[c] = dot
-
-
-@ranged
-def _turned(first, last, taken, z, share, x, p):
-    """x + taken p, and the direction z + share p, in place."""
-    for k in range(first, last):
-        i = np.uint64(k)
-        x[i] += taken * p[i]
-        p[i] = z[i] + share * p[i]
 
 
 @dataclass(frozen=True)

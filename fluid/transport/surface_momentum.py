@@ -53,7 +53,8 @@ import numpy as np
 from array_types import Array
 from fluid.domain.topology import NO_WATER, Graph, Topology
 from fluid.numerics.fields import copied, places_of
-from fluid.surface.volume import Flux, Shift, diffused_shift
+from fluid.surface.shift import diffused_shift
+from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
 from kernels.decorators import inner, ranged, released

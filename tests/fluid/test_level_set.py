@@ -12,7 +12,8 @@ from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.surface.closest_triangles import squared_distance
 from fluid.surface.level_set import FAR, no_steeper, redistance
-from fluid.surface.volume import _shift, nodal_volume
+from fluid.surface.shift import _shift
+from fluid.surface.volume import nodal_volume
 from kernels.decorators import plain
 
 H = 0.1

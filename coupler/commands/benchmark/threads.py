@@ -155,7 +155,8 @@ def roofline(nodes: int) -> dict:
 
 @contextmanager
 def _traffic(nodes: int, cells: int) -> Iterator[dict[str, list[float]]]:
-    """Seconds and bytes of every shared kernel that runs meanwhile, by its name."""
+    """Seconds and bytes of every shared kernel that Python calls meanwhile, by its name; those that compiled code hands
+    out one after the other (`kernels/in_a_row.py`) are left out."""
     import kernels.threads as team
 
     found: dict[str, list[float]] = {}
