@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import inner, kernel, released
+from kernels.decorators import inner, kernel, plain, released
 from yade_scripts.contact.arrays import CROSSINGS, ROOM, Direction, Faces
 from yade_scripts.contact.boxes import CLEAR, between_boxes, planes_of_box
 from yade_scripts.contact.edges import pair_scratch
@@ -56,8 +56,10 @@ def contact_forces(share, shapes, bodies, law, pairs, slots, ground, state, rows
     """
     lost = np.zeros(len(pairs.a))
     scene = (shapes, bodies, law, pairs, slots, ground, F, state, rows, lost)
-    spans = np.array(share(_contacts, len(pairs.a), *scene, weight=PAIR, pieces=PIECES))
-    return _added_up(spans, rows, lost, F)
+    spans = share(_contacts, len(pairs.a), *scene, weight=PAIR, pieces=PIECES)
+    if len(spans) == 1:
+        return spans[0][1], _total(lost)
+    return _added_up(np.array(spans), rows, F), _total(lost)
 
 
 @released
@@ -168,21 +170,25 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
     return begins, count
 
 
+@plain
+def _total(lost):
+    total = 0.0
+    for p in range(len(lost)):
+        total += lost[p]
+    return total
+
+
 @kernel
-def _added_up(spans, rows, lost, F):
-    """Move the rows of several `spans` (k, 2) together and add their forces to F; a single span has added its own
-    already. → (number of rows, Σ lost)"""
-    count, S = spans[0, 1] if len(spans) == 1 else 0, np.empty(3)
-    for k in range(len(spans) if len(spans) > 1 else 0):
+def _added_up(spans, rows, F):
+    """Move the rows of several `spans` (k, 2) together and add their forces to F → number of rows."""
+    count, S = 0, np.empty(3)
+    for k in range(len(spans)):
         for c in range(spans[k, 0], spans[k, 1]):
             if c != count:
                 _move(rows, c, count)
             add_up(rows, count, F, S)
             count += 1
-    total = 0.0
-    for p in range(len(lost)):
-        total += lost[p]
-    return count, total
+    return count
 
 
 @inner

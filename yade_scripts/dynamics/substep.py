@@ -103,7 +103,8 @@ class Substepper:
             self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
         for row, motion in self._prescribed.items():
             self._scene.set_motion(row, np.concatenate([motion.mean_velocity(time, dt), before[row, 3:]]))
-        self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
+        all_are_pushed = len(self._pushed) == len(self._F)
+        self._scene.step(dt, self._pushed_ids, self._F if all_are_pushed else self._F[self._pushed])
         m.dt = dt
         m.read_watched()
         if missing > 0.0:
