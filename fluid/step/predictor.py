@@ -40,6 +40,7 @@ from fluid.surface.level_set import redistance
 from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
+from fluid.transport.surface_momentum import share_of_fast
 from kernels.decorators import ranged, released
 from kernels.threads import found_over, over, zeros
 
@@ -159,7 +160,7 @@ def predicted(water, dt: float) -> PressureProblem:
     calm = water.calm(dt, crossing)
     held = added(carried, displaced)
     phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, water.on_one_side)
-    surface = _new_surface(water, calm, phi, held, conserved + beside)
+    surface = _new_surface(water, calm, crossing, phi, held, conserved + beside)
     in_jumps = None
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
@@ -255,8 +256,8 @@ def _taken_over(first, last, listed, moved, finer, width, u, phi):
             phi[i] = moved[s, 3]
 
 
-def _new_surface(water, calm, phi, carried, conserved):
-    """φ corrected: VolumeCorrection. calm: `Water.calm`."""
+def _new_surface(water, calm, crossing, phi, carried, conserved):
+    """φ corrected: VolumeCorrection. calm: `Water.calm` · crossing [m/s]: `Water.crossing`."""
     p = water.parameters
     length = p.correction_length + (p.calm_correction_length - p.correction_length) * calm
     return correct_volume(
@@ -268,6 +269,7 @@ def _new_surface(water, calm, phi, carried, conserved):
         conserved,
         length,
         water.topology.node_size,
+        share_of_fast(crossing / np.sqrt(p.gravity * water.mesh.spacing)),
     )
 
 

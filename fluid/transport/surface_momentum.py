@@ -8,17 +8,7 @@ runs up a wall lose momentum in the same way, and the more, the fewer cells they
 
 where u_volume is carried by the fluxes of the volume (`volume_transport.py`).  The level set that is then corrected
 towards the volume contains other volumes at the nodes than the fluxes brought: what one node has too much, others
-receive.  In the equation of that correction (`volume.py`, 2), c ψ + κ K ψ = r, the volumes
-
-    v_ij = -κ K_ij (ψ_i - ψ_j)                                                                              (2)
-
-pass from node to node, and they carry momentum as the fluxes do.  A node gains m_i by the correction, and by what the
-surface sweeps beyond the fluxes.  Where the surface is steep that is not Σ_j v_ji, since (2) is linear.  Around jumps
-the rest passes on, too:
-
-    v'_ij = -h K'_ij (χ_i - χ_j),      Σ_j v'_ji = m_i - Σ_j v_ji,                                           (3)
-
-K' between nodes that hold water.
+receive, and its momentum with it (`passed_on.py`).
 
 In fast water w = R(|u|/√(g h); 1, 3), h the size of the cells and R(x; b, c) = (x - b)/(c - b) kept within 0 and 1:
 where water is faster than the shallow-water wave of one cell, its motion within a cell is governed by momentum.  Slower
@@ -33,7 +23,7 @@ full between the surface and 2 h, within RINGS nodes around a jump: a node with 
 flows into it, u_up with acceleration a_up,
 
     R(d/√(g h); 0.1, 0.3) R(η; 0.5, 0.9) R(s; 0.25, 0.75),    d = |u_up| - |u|,
-    η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (4)
+    η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (2)
 
 η is the share of the head that is lost between the two nodes and not spent against pressure and weight. To conserve
 momentum where water slows down in jumps, and head elsewhere, is the rule of Stelling and Duinmeijer (Int. J. Numer.
@@ -52,13 +42,12 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.topology import NO_WATER, Graph, Topology
-from fluid.numerics.fields import copied, places_of
-from fluid.surface.shift import diffused_shift
-from fluid.surface.volume import Flux, Shift
-from fluid.transport.velocity_transport import carry_velocity
+from fluid.numerics.fields import copied
+from fluid.surface.volume import Flux
+from fluid.transport.passed_on import pass_on
 from fluid.transport.volume_transport import carry_volume
 from kernels.decorators import inner, ranged, released
-from kernels.threads import found_over, over, zeros
+from kernels.threads import over, zeros
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""
@@ -68,14 +57,8 @@ FAST = (1.0, 3.0)
 RESOLVED = (10.0, 30.0)
 """|u| h/ν between which that sets in. Up to 100, the tip of a column of a thick liquid followed the paths, and gained
 energy as that of water does without the momentum of the volume."""
-CONDUCTING, ANCHOR = 0.05, 0.02
-"""Of the matrix of (3): share of what a node can hold from which water passes through it as everywhere, so that nodes
-that hold next to none take no part; and share of its edges that is added to the diagonal of a node, so that what comes
-to all nodes of a region alike is not sought from far away."""
-TOLERANCE, MOST_ITERATIONS = 1e-2, 100
-"""Where the conjugate gradients of (3) end."""
 DROP, LOST, FULL = (0.1, 0.3), (0.5, 0.9), (0.25, 0.75)
-"""Where the ramps of (4) begin and end."""
+"""Where the ramps of (2) begin and end."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +66,8 @@ class Carried:
     """Result of the fluxes of a step at the nodes: water (N,) [m³], that of the fluxes along the edges, and swept (N,)
     [m³] what the surface brings beyond that (`swept_volume.py`); velocity (N, 3) [m/s], the weight w (N,) of it
     around jumps before it is cut off at depth, and that in fast water (N,); None where there is neither. jumps (N,):
-    the weight around jumps alone, whatever `weight` contains."""
+    the weight around jumps alone, whatever `weight` contains · near_fast (N,): the largest `fast` of a node and those
+    around it, of which some that are dry have none."""
 
     water: np.ndarray
     velocity: np.ndarray | None = None
@@ -91,6 +75,7 @@ class Carried:
     fast: np.ndarray | None = None
     swept: np.ndarray | None = None
     jumps: np.ndarray | None = None
+    near_fast: np.ndarray | None = None
 
     @classmethod
     def by(
@@ -113,14 +98,18 @@ class Carried:
         if not jumps and not n_fast:
             volume, moved = carry_volume(flux, dt)
             return cls(volume), moved
+        near_fast = copied(fast)
+        if n_fast:
+            over(_wider, n, flux.nodes, edges, fast, near_fast)
         volume, moved = carry_volume(flux, dt, velocity)
-        return cls(volume, velocity, weight, fast, jumps=weight), moved
+        return cls(volume, velocity, weight, fast, jumps=weight, near_fast=near_fast), moved
 
     def near_the_surface(self) -> Carried:
         """The same with the velocity of fast water, too, only where that around jumps counts."""
         if self.velocity is None:
             return self
-        return replace(self, weight=np.maximum(self.weight, self.fast), fast=np.zeros_like(self.fast))
+        none = np.zeros_like(self.fast)
+        return replace(self, weight=np.maximum(self.weight, self.fast), fast=none, near_fast=none)
 
     def handed_on(self, heirs) -> Carried:
         """The same with another numbering of the nodes; heirs (N_new, N): from `volume.renumbering`."""
@@ -131,19 +120,21 @@ class Carried:
         fields = np.column_stack([self.velocity, self.weight, self.fast, self.jumps])
         fields = (heirs @ (held * fields)) / np.maximum(heirs @ held, 1e-300)
         weight, fast, jumps = (fields[:, k].copy() for k in (3, 4, 5))
-        return Carried(water, fields[:, :3].copy(), weight, fast, swept, jumps)
+        near_fast = np.minimum(heirs @ self.near_fast, 1.0)  # dry nodes have it, too
+        return Carried(water, fields[:, :3].copy(), weight, fast, swept, jumps, near_fast)
 
     def into(self, u, nodes, phi, graph: Graph, correction, held, t: Topology, on_open_side) -> Array:
-        """Equations (1) to (3) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
+        """Equation (1) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
         → share (N,) to which water at nodes above the surface keeps its own momentum.
 
         correction: `volume.VolumeCorrection` of what the nodes held (N,) [m³] · on_open_side (N,) bool: nodes that
         water leaves through: what the fluxes bring there is not yet all that came. Only where some water is fast, or
         there is a jump; `velocity` is overwritten."""
-        jumps = np.empty(len(phi))
+        jumps, share = np.empty(len(phi)), np.empty(len(phi))
         over(_without, len(phi), self.jumps, t.near_solids, on_open_side, jumps)
+        over(_larger, len(phi), jumps, self.near_fast, on_open_side, share)
         gained = (correction.nodal_water, held, self.swept)
-        _pass_on(graph, correction.shift, gained, jumps, self.water, t.node_volume, self.velocity)
+        pass_on(graph, correction.shift, gained, share, self.water, t.node_volume, self.velocity)
         at_surface = (phi, t.node_size, t.near_solids)
         state = ((self.water, t.node_volume), (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
@@ -155,6 +146,11 @@ def by_speed(nodes, velocity, gravity: float, viscosity: float, spacing, weight)
 
     velocity (N, 3) [m/s] · gravity [m/s²] · viscosity: kinematic [m²/s] · spacing (N,) [m]: size of the cells"""
     return sum(over(_by_speed, len(nodes), nodes, velocity, gravity, viscosity, spacing, weight))
+
+
+def share_of_fast(speed: float) -> float:
+    """R(x; FAST) of a speed in √(g h)."""
+    return min(1.0, max(0.0, (speed - FAST[0]) / (FAST[1] - FAST[0])))
 
 
 @ranged
@@ -183,103 +179,17 @@ def _without(first, last, weight, some, others, out):
         out[i] = 0.0 if some[i] or others[i] else weight[i]
 
 
-def _pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> None:
-    """Velocity u (N, 3) [m/s] carried along with the volumes (2) and (3), in place.
-
-    gained: m_i = first - second + third (N,) [m³] · share (N,) of its rest that is passed on · water, capacity (N,)
-    [m³]: what the nodes hold before, and could hold."""
-    n, edges, spacing = len(water), graph.edges, shift.spacing
-    chi, inside, came, moved = np.empty(n), np.zeros(n, bool), np.empty(n), np.empty(len(graph.neighbour))
-    state = (water, capacity, shift.kappa, shift.value)
-    band = found_over(_holding, len(shift.band), shift.band, *state, chi, inside, came)
-    over(_passed, len(band), band, edges, chi, inside, spacing, water, moved)
-    carry_velocity(band, edges, moved, (water, capacity), u, came)
-    sought = np.empty(len(band))
-    if not sum(over(_sought, len(band), band, gained, share, came, sought)):
-        return
-    place = places_of(band, n)
-    stiffness, anchor, left = np.empty(len(edges.stiffness)), np.empty(len(band)), np.empty(n)
-    over(_through_water, len(band), band, edges, spacing, water, capacity, came, (stiffness, anchor, left))
-    edges = edges._replace(stiffness=stiffness)
-    rest = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
-    over(_put, len(band), band, rest, chi)
-    over(_passed, len(band), band, edges, chi, inside, spacing, left, moved)
-    carry_velocity(band, edges, moved, (left, capacity), u)
-
-
-@released
-def _holding(first, last, band, water, capacity, kappa, value, chi, inside, came):
-    """Those nodes of the band that hold water, in order, at which χ of (2), inside and came (N,) are set."""
-    found, n = np.empty(last - first, np.int64), 0
-    for s in range(first, last):
-        i = band[s]
-        if water[i] > NO_WATER * capacity[i]:
-            chi[i], inside[i], came[i] = kappa * value[s], True, 0.0
-            found[n] = i
-            n += 1
-    return found[:n].copy()
-
-
 @ranged
-def _put(first, last, nodes, values, field):
-    """field (N,) ← values (n,) at the listed nodes."""
-    for s in range(first, last):
-        field[nodes[s]] = values[s]
-
-
-@released
-def _sought(first, last, band, gained, share, came, out):
-    """What (3) is to take from the nodes of the band (n,) [m³], in `out`; at how many that is not zero.
-
-    came (N,) [m³]: what (2) brought."""
-    (first_of, less, more), count = gained, 0
-    for s in range(first, last):
-        i = band[s]
-        out[s] = -(share[i] * (first_of[i] - less[i] + more[i] - came[i]))
-        count += out[s] != 0.0
-    return count
-
-
-@ranged
-def _through_water(first, last, band, edges, spacing, water, capacity, came, made):
-    """made: K (edges,) times the least share of CONDUCTING that both ends hold of what they could; ANCHOR times the sum
-    of it times h (n,); and the water that is left at the band (N,) [m³] with what came to it."""
-    stiffness, anchor, left = made
-    for r in range(first, last):
-        i, total = band[r], 0.0
-        own = water[i] / max(
-            capacity[i], 1e-300
-        )  # a body may have taken all room of a node that still holds water
-        for s in range(edges.start[edges.row[i]], edges.start[edges.row[i] + 1]):
-            j = edges.neighbour[s]
-            least = min(own, max(water[j], 0.0) / max(capacity[j], 1e-300))
-            stiffness[s] = edges.stiffness[s] * min(least / CONDUCTING, 1.0)
-            total -= 0.5 * (spacing[i] + spacing[j]) * stiffness[s]
-        anchor[r], left[i] = ANCHOR * total, max(water[i] + came[i], 0.0)
-
-
-@ranged
-def _passed(first, last, band, edges, chi, inside, spacing, water, moved):
-    """Volumes (edges,) [m³] of (2) or (3) out of each node of the band, where both hold water; none gives more than it
-    holds. inside (N,) bool: where the band holds water · χ (N,), read there."""
-    start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
-    for place in range(first, last):
-        i = band[place]
-        row, total = edges.row[i], 0.0
-        for s in range(start[row], start[row + 1]):
-            j = neighbour[s]
-            moved[s] = 0.0
-            if inside[j]:
-                moved[s] = max(0.0, -0.5 * (spacing[i] + spacing[j]) * stiffness[s] * (chi[i] - chi[j]))
-                total += moved[s]
-        if total > water[i]:
-            for s in range(start[row], start[row + 1]):
-                moved[s] *= water[i] / total
+def _larger(first, last, one, other, excepted, out):
+    """The larger of two weights (N,), only the first where `excepted` (N,) bool."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        out[i] = one[i] if excepted[i] else max(one[i], other[i])
 
 
 @released
 def _jumps(first, last, nodes, edges, rate, water, capacity, u, a, gravity, spacing, weight):
-    """Equation (4), (N,), in `weight`, zero at first, and at how many nodes it is not zero."""
+    """Equation (2), (N,), in `weight`, zero at first, and at how many nodes it is not zero."""
     n_jumps = 0
     row, start, neighbour = edges.row, edges.start, edges.neighbour
     up, push = np.empty(3), np.empty(3)

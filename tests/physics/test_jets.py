@@ -7,6 +7,7 @@ import pytest
 
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.jets import GRAVITY, LIMITS, SLUG, _start, jet
+from coupler.commands.verify.scenes import DENSITY
 from fluid.numerics.bounded import solve_pressure
 from fluid.readings.gauges import level_set_at
 from fluid.step.remainders import kept_near_the_surface, left_in_cells
@@ -19,6 +20,29 @@ EXACT = dict(zip(*(columns("jet_on_plate")[name].tolist() for name in ("L_over_D
 def test_a_jet_of_a_few_cells_gives_a_plate_its_force(width, n):
     """Momentum reaches the plate though the jet is two or four cells thick; half of it got lost along paths."""
     assert jet(width, n).force == pytest.approx(EXACT[width], rel=LIMITS[n])
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.25])
+def test_a_sheet_on_two_cells_pushes_with_what_arrives(aside):
+    """What the correction of the level set hands on took momentum where nodes hold little: 2 and 5 % were lost."""
+    assert jet(12.0, 2, aside=aside).force == pytest.approx(1.0, abs=0.025)
+
+
+def test_the_correction_of_the_level_set_keeps_the_momentum_and_the_place_of_a_thin_sheet():
+    """In the 6 D/U in which a jet of eight widths meets a plate, on two cells: the last shift, which brings the total
+    volume back along all of the surface, moved 3 D² when the equation before it was solved once only, and 0.1 of the
+    momentum ρ U D² was lost."""
+    water, _, _ = _start(12.0, 2, 90.0, 1.0, "bounded", 0.0, 0.0, "wide")
+    shifted, lost, scale = 0.0, 0.0, 0.5  # the depth of the slice
+    while water.time < 6.0:
+        problem = water.predict(min(water.stable_step(), water.mesh.finest))
+        found = solve_pressure(problem, 1e-9)
+        water.correct(problem, found.x, found.parting)
+        lines = water.report.momentum.lines
+        shifted += abs(water.report.reinserted) / scale
+        lost -= (lines["transport"] + lines["volume_correction"])[0] / (DENSITY * scale)
+    assert shifted < 0.1
+    assert abs(lost) < 0.04
 
 
 @pytest.mark.parametrize(
@@ -58,10 +82,10 @@ def test_the_place_of_the_edges_between_the_nodes_hardly_matters():
     assert jet(1.0, 8, aside=0.5, openings="wide").force > 1.07 * EXACT[1.0]
 
 
-@pytest.mark.parametrize(("width", "n", "most"), [(0.5, 4, 1.08), (1.0, 8, 1.045)])
+@pytest.mark.parametrize(("width", "n", "most"), [(0.5, 4, 1.12), (1.0, 8, 1.045)])
 def test_short_steps_leave_the_force_as_it_is(width, n, most):
     """A quarter of the step: without any remainder of the velocity near the surface, wiggles of the pressure beside the
-    edges add 4 and 2.4 % to a force that is 4.6 and 2.4 % too large."""
+    edges add 11 and 3 % to forces that are 10 and 3 % too large (8 and 3 % while momentum was lost on its way)."""
     assert jet(width, n, courant=0.25).force < most * EXACT[width]
 
 

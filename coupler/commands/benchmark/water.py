@@ -19,7 +19,7 @@ STAGES = {
     "volume": (
         ("transport.surface_momentum", "carry_volume"),
         ("transport.surface_momentum", "_jumps"),
-        ("transport.surface_momentum", "_pass_on"),
+        ("transport.surface_momentum", "pass_on"),
         ("step.predictor", "correct_volume"),
         ("surface.volume", "edge_flux"),
     ),
