@@ -205,7 +205,7 @@ def test_bed_of_manning_slows_a_uniform_stream_as_its_law_says():
 
 def test_mannings_law_is_that_of_the_bed_alone():
     """Sides that stand upright have no depth over them: drag on the nodes of the floor, none on the others."""
-    water = tank([1, 0.25, 1], 0.125, lambda x: x[:, 2] - 0.5)
+    water = tank([1, 0.25, 1], 0.125, lambda x: x[:, 2] - 0.5, walls="friction", manning=0.03)
     friction = WallFriction.of(WaterParameters(walls="friction", manning=0.03))
     u = np.tile([1.0, 0.0, 1.0], (len(water.topology.nodes), 1))
     drag = friction.of_nodes(water, water.level_set, friction.columns(water, water.level_set, u, 0.0), u)
