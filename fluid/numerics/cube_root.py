@@ -8,9 +8,12 @@ exact.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from array_types import Array
+from kernels.decorators import inner
 
 ROUND_TO_24_BITS = 1.5 * 2.0**28
 """Added to a number between 1/2 and 1 and taken away again, it leaves multiples of 2^-24."""
@@ -37,3 +40,14 @@ def _root_below_one(y):
     t = (t + ROUND_TO_24_BITS) - ROUND_TO_24_BITS
     quotient = y / (t * t)
     return t + t * ((quotient - t) / (t + t + quotient))
+
+
+_below_one = inner(_root_below_one)
+
+
+@inner
+def root_of(x):
+    """`cube_root` of one positive number, for kernels."""
+    mantissa, exponent = math.frexp(x)
+    k = -(-exponent // 3)
+    return math.ldexp(_below_one(math.ldexp(mantissa, exponent - 3 * k)), k)

@@ -1,4 +1,4 @@
-"""Viscous stress and wall stress of P1 velocities, and conjugate gradients on them, without a matrix.
+"""Viscous stress and wall stress of P1 velocities, without a matrix.
 
 r = f - K u is the rate of momentum [N] that the stresses give to the nodes,
 
@@ -24,14 +24,17 @@ from fluid.mesh.arrays import Hats
 from fluid.viscous.beyond import Beyond, follow, hand_on
 from fluid.viscous.strain import (
     COLUMN,
+    PER_NODE,
     ROW,
+    NodeCorners,
     StrainEdges,
     add_to_edges,
     edge_strain,
     mean_strain,
     spread_stress,
 )
-from kernels.decorators import kernel
+from kernels.decorators import inner, kernel, plain, ranged
+from kernels.threads import over
 
 
 class Walls(NamedTuple):
@@ -51,10 +54,11 @@ class Walls(NamedTuple):
 
 
 class ViscousTerms(NamedTuple):
-    """The data that K and f are assembled from: cells (n,) in the water, weight (n,) 2μ times their water · walls ·
-    viscosity μ · node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on sides, projector (k, 3, 3)
-    onto the directions that are free there · idle (N,) bool: nodes that keep their velocity · hats · edges of the cells
-    in the water · beyond: nodes that change with those in the water."""
+    """The data that K and f are assembled from: cells (n,) in the water where there is stress in it, weight (n,) 2μ
+    times their water · walls · viscosity μ · node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on
+    sides, each once, projector (k, 3, 3) onto the directions that are free there · idle (N,) bool: nodes that keep
+    their velocity · hats · edges of the cells · corners: all nodes that stresses act on or that may change · beyond:
+    nodes that change with those in the water."""
 
     cells: Ints
     weight: Floats
@@ -66,6 +70,7 @@ class ViscousTerms(NamedTuple):
     idle: Bools
     hats: Hats
     edges: StrainEdges
+    corners: NodeCorners
     beyond: Beyond
 
 
@@ -77,7 +82,7 @@ def wall_stress(walls, mu, u, body_velocity, edges, strains, cells, out, load):
     walls: Walls · body_velocity (n_bodies, 6) · edges: StrainEdges · strains: the strain of u (n_edges, 6), and
     flux."""
     cell, row, body, normal, hat, arm, area, nitsche, drag = walls
-    edge, edge_weight = edges
+    edge, edge_weight = edges.of_cell, edges.weight
     strain, flux = strains
     mean = np.empty((3, 3))
     t, v, f, pull, x = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6)
@@ -113,7 +118,7 @@ def wall_stress(walls, mu, u, body_velocity, edges, strains, cells, out, load):
             add_to_edges(flux, edge[row[s]], edge_weight, x)
 
 
-@kernel
+@inner
 def _slip_velocity(walls, s, q, u, V, cells, v):
     """v = u - u_Γ at point q of polygon s, in place."""
     e, b, hat, arm = walls.cell[s], walls.body[s], walls.hat, walls.arm
@@ -125,7 +130,6 @@ def _slip_velocity(walls, s, q, u, V, cells, v):
             v[k] += hat[s, q, a] * u[cells[e, a], k]
 
 
-@kernel
 def momentum_rate(terms, u, body_velocity):
     """r (N, 3) [N] and load (n_bodies, 6) [N, N m]: what acts on the nodes beyond the surface is handed on to those in
     the water.  terms: ViscousTerms."""
@@ -135,18 +139,20 @@ def momentum_rate(terms, u, body_velocity):
     return r, load
 
 
-@kernel
 def hold_rate(terms, u, r):
     """Add the drag of the sides of the tank to r (N, 3) [N], and set what they constrain to zero, in place."""
-    node_drag = terms.node_drag
-    for i in range(u.shape[0]):
-        if node_drag[i] != 0.0:
-            for k in range(3):
-                r[i, k] -= node_drag[i] * u[i, k]
-    restrict(r, terms.held, terms.projector, terms.idle)
+    over(_rub, len(terms.corners.nodes), terms.corners.nodes, terms.node_drag, u, r)
+    restrict(terms, r)
 
 
-@kernel
+@ranged
+def _rub(first, last, nodes, node_drag, u, r):
+    for s in range(first, last):
+        i = np.uint64(nodes[s])
+        for k in range(3):
+            r[i, k] -= node_drag[i] * u[i, k]
+
+
 def unheld_rate(terms, u, body_velocity):
     """r and load as of `momentum_rate`, where the stresses act, without the drag and the constraints of the sides of
     the tank."""
@@ -154,78 +160,98 @@ def unheld_rate(terms, u, body_velocity):
     r = np.zeros_like(u)
     load = np.zeros_like(body_velocity)
     strain = edge_strain(cells, weight, edges, u, hats)
-    flux = strain.copy()
-    wall_stress(terms.walls, terms.viscosity, u, body_velocity, edges, (strain, flux), hats.cells, r, load)
-    spread_stress(cells, weight, edges.of_cell, flux, hats, r)
+    flux = strain
+    if len(terms.walls.cell) > 0:
+        flux = strain.copy()
+        wall_stress(
+            terms.walls, terms.viscosity, u, body_velocity, edges, (strain, flux), hats.cells, r, load
+        )
+    spread_stress(cells, weight, edges, terms.corners, flux, hats, r)
     return r, load
 
 
-@kernel
-def restrict(r, node, projector, idle):
-    """Set to zero the components that the sides of the tank constrain, in place."""
-    moved = np.empty(3)
-    for s in range(node.shape[0]):
+def restrict(terms, r):
+    """Set to zero the components that the sides of the tank constrain, and idle nodes, in place."""
+    over(_project, len(terms.held), terms.held, terms.projector, r)
+    over(_stop, len(terms.corners.nodes), terms.corners.nodes, terms.idle, r)
+
+
+@ranged
+def _project(first, last, node, projector, r):
+    for s in range(first, last):
+        i = np.uint64(node[s])
+        x, y, z = r[i, 0], r[i, 1], r[i, 2]
         for k in range(3):
-            moved[k] = 0.0
-            for m in range(3):
-                moved[k] += projector[s, k, m] * r[node[s], m]
-        r[node[s]] = moved
-    for i in range(r.shape[0]):
+            r[i, k] = projector[s, k, 0] * x + projector[s, k, 1] * y + projector[s, k, 2] * z
+
+
+@ranged
+def _stop(first, last, nodes, idle, r):
+    for s in range(first, last):
+        i = np.uint64(nodes[s])
         if idle[i]:
-            for k in range(3):
-                r[i, k] = 0.0
+            r[i, 0], r[i, 1], r[i, 2] = 0.0, 0.0, 0.0
 
 
-@kernel
 def hand_in(terms, r):
     """Pass r (N, 3) of the nodes beyond the surface on to those in the water, as far as sides let these go, in
     place."""
     if len(terms.beyond.nodes) > 0:
         hand_on(terms.beyond, r)
-        restrict(r, terms.held, terms.projector, terms.idle)
+        restrict(terms, r)
 
 
-@kernel
-def _follow(terms, d):
+def follow_water(terms, d):
     """Give the nodes beyond the surface what (1) of `beyond.py` gives them, in place; d (N, 3)."""
     if len(terms.beyond.nodes) > 0:
         follow(terms.beyond, d)
-        restrict(d, terms.held, terms.projector, terms.idle)
+        restrict(terms, d)
 
 
-@kernel
 def preconditioner(terms, mass, tau):
     """1 / diagonal (N,) of M + τ K without the flux terms; 0 on idle nodes."""
-    cell_list, weight, idle = terms.cells, terms.weight, terms.idle
-    cells, parent, g = terms.hats
-    cell, hat, area = terms.walls.cell, terms.walls.hat, terms.walls.area
-    nitsche, drag = terms.walls.nitsche, terms.walls.drag
-    diagonal = mass + tau * terms.node_drag
-    _hand_on_mass(terms.beyond, mass, diagonal)
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        for a in range(4):
-            square = 0.0
-            for k in range(3):
-                square += g[parent[e], a, k] ** 2
-            diagonal[cells[e, a]] += tau * 2.0 / 3.0 * weight[s] * square
+    nodes, diagonal, inverse = terms.corners.nodes, np.zeros(len(mass)), np.zeros(len(mass))
+    over(_diagonal, len(nodes), terms, mass, tau, diagonal, weight=PER_NODE)
+    _add_walls(terms.walls, terms.beyond, mass, tau, terms.hats.cells, diagonal)
+    over(_inverse, len(nodes), nodes, terms.idle, diagonal, inverse)
+    return inverse
+
+
+@ranged
+def _diagonal(first, last, terms, mass, tau, diagonal):
+    """Mass, drag and the stress in the cells of the nodes."""
+    cell_list, weight, node_drag = terms.cells, terms.weight, terms.node_drag
+    parent, g = terms.hats.parent, terms.hats.gradients
+    nodes, start, corner = terms.corners
+    for row in range(first, last):
+        r = np.uint64(row)
+        i = np.uint64(nodes[r])
+        total = 0.0
+        for t in range(np.uint64(start[r]), np.uint64(start[r + np.uint64(1)])):
+            s, a = np.uint64(corner[t]) // np.uint64(4), np.uint64(corner[t]) % np.uint64(4)
+            p = np.uint64(parent[np.uint64(cell_list[s])])
+            total += weight[s] * (g[p, a, 0] ** 2 + g[p, a, 1] ** 2 + g[p, a, 2] ** 2)
+        diagonal[i] = mass[i] + tau * (node_drag[i] + 2.0 / 3.0 * total)
+
+
+@plain
+def _add_walls(walls, beyond, mass, tau, cells, diagonal):
+    """Add the walls, and the mass of the nodes beyond the surface to those that they change with, in place."""
+    cell, hat, area, nitsche, drag = walls.cell, walls.hat, walls.area, walls.nitsche, walls.drag
+    for s in range(len(beyond.nodes)):
+        for t in range(beyond.start[s], beyond.start[s + 1]):
+            diagonal[beyond.wet[t]] += beyond.share[t] * mass[beyond.nodes[s]]
     for s in range(cell.shape[0]):
         for q in range(3):
             for a in range(4):
                 diagonal[cells[cell[s], a]] += tau * area[s, q] * (nitsche[s] + drag[s]) * hat[s, q, a] ** 2
-    inverse = np.zeros_like(diagonal)
-    for i in range(diagonal.shape[0]):
-        if not idle[i] and diagonal[i] > 0.0:
-            inverse[i] = 1.0 / diagonal[i]
-    return inverse
 
 
-@kernel
-def _hand_on_mass(beyond, mass, total):
-    """Add the mass (N,) of the nodes beyond the surface to the total (N,) of those that they change with, in place."""
-    for s in range(len(beyond.nodes)):
-        for t in range(beyond.start[s], beyond.start[s + 1]):
-            total[beyond.wet[t]] += beyond.share[t] * mass[beyond.nodes[s]]
+@ranged
+def _inverse(first, last, nodes, idle, diagonal, inverse):
+    for s in range(first, last):
+        i = np.uint64(nodes[s])
+        inverse[i] = 0.0 if idle[i] or diagonal[i] <= 0.0 else 1.0 / diagonal[i]
 
 
 @kernel
@@ -255,7 +281,7 @@ def body_preconditioner(terms, body_mass, moves, tau):
     return inverse
 
 
-@kernel
+@inner
 def _slip_of_body(s, q, arm, c):
     """Write c (3, 6), which takes the six velocities of a body to the velocity of a point of its polygon."""
     x, y, z = arm[s, q, 0], arm[s, q, 1], arm[s, q, 2]
@@ -265,65 +291,3 @@ def _slip_of_body(s, q, arm, c):
     c[0, 4], c[0, 5] = z, -y
     c[1, 3], c[1, 5] = -z, x
     c[2, 3], c[2, 4] = y, -x
-
-
-@kernel
-def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most):
-    """Solve (M + τ K) (d, D) = (right, body_right) by conjugate gradients → d (N, 3), D (n_bodies, 6), the number of
-    iterations, and the last residual over the first.
-
-    terms: ViscousTerms · mass (N,) [kg] · tau [s] ·
-    right (N, 3) [N s] · bodies: (mass (n_bodies, 6, 6) [kg, kg m²], moves (n_bodies,) bool: the others keep their
-    velocity) · body_right (n_bodies, 6) [N s, N m s]."""
-    body_mass, moves = bodies
-    inverse = preconditioner(terms, mass, tau)
-    body_inverse = body_preconditioner(terms, body_mass, moves, tau)
-    d, r = np.zeros_like(right), right.copy()
-    D, R = np.zeros_like(body_right), body_right.copy()
-    z, Z = _scaled(inverse, r), _answers(body_inverse, R)
-    p, P = z.copy(), Z.copy()
-    _follow(terms, p)
-    rz = np.sum(r * z) + np.sum(R * Z)
-    first = rz
-    count = 0
-    while rz > tolerance * tolerance * first and count < most:
-        change, load = unheld_rate(terms, p, P)
-        hold_rate(terms, p, change)
-        Ap, AP = np.empty_like(p), np.zeros_like(P)
-        for i in range(p.shape[0]):
-            for k in range(3):
-                Ap[i, k] = mass[i] * p[i, k] - tau * change[i, k]
-        hand_in(terms, Ap)
-        for b in range(len(moves)):
-            if moves[b]:
-                AP[b] = body_mass[b] @ P[b] - tau * load[b]
-        alpha = rz / (np.sum(p * Ap) + np.sum(P * AP))
-        d += alpha * p
-        D += alpha * P
-        r -= alpha * Ap
-        R -= alpha * AP
-        z, Z = _scaled(inverse, r), _answers(body_inverse, R)
-        before, rz = rz, np.sum(r * z) + np.sum(R * Z)
-        p = z + (rz / before) * p
-        _follow(terms, p)
-        P = Z + (rz / before) * P
-        count += 1
-    return d, D, count, np.sqrt(rz / first) if first > 0.0 else 0.0
-
-
-@kernel
-def _answers(inverse, R):
-    """The products of inverse (n, 6, 6) and R (n, 6) for each body."""
-    out = np.zeros_like(R)
-    for b in range(R.shape[0]):
-        out[b] = inverse[b] @ R[b]
-    return out
-
-
-@kernel
-def _scaled(factor, r):
-    out = np.empty_like(r)
-    for i in range(r.shape[0]):
-        for k in range(3):
-            out[i, k] = factor[i] * r[i, k]
-    return out

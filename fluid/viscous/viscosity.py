@@ -30,18 +30,19 @@ from array_types import Bools, Floats
 from fluid.domain.hats import hat_values
 from fluid.domain.moments import wet_fraction
 from fluid.numerics.solve import NotConverged
-from fluid.numerics.sums import momentum_of
+from fluid.numerics.sums import momentum_of_rows
 from fluid.viscous.beyond import Beyond, beyond_surface, hand_on
 from fluid.viscous.kernels import (
     ViscousTerms,
     Walls,
+    hand_in,
     hold_rate,
-    implicit_change,
-    momentum_rate,
     restrict,
     unheld_rate,
 )
-from fluid.viscous.strain import StrainEdges, edges_of
+from fluid.viscous.solve import Implicit, product_of
+from fluid.viscous.strain import NodeCorners, StrainEdges, edges_of
+from kernels.threads import marked
 
 GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE = 1e-7
@@ -83,26 +84,26 @@ class FreeBodies:
 
 
 class WettedWalls:
-    """Polygons of a domain with the values of the hats at their points; made once per domain.
+    """Polygons of a domain with water in their cells, and the values of the hats at their points.
 
     cell, body (S,) · normal (S, 3) · hat (S, 3, 4) · arm (S, 3, 3) [m] from the centre of the body · area (S,) [m²] ·
     per_volume (S,) [1/m] wetted area of the cell over the volume left of it."""
 
-    def __init__(self, domain):
-        d = domain
-        self.domain = d
-        self.cell, self.body = d.face_cell.astype(np.int64), d.face_body.astype(np.int64)
-        self.normal = np.ascontiguousarray(d.face_normal)
-        self.hat = hat_values(self.cell, d.face_points, d.hats, d.nodes)
-        self.arm = np.ascontiguousarray(d.face_points - d.body_centre[d.face_body][:, None])
-        self.area = d.face_area
-        wetted = np.bincount(d.face_cell, d.face_area, minlength=len(d.cells))[d.face_cell]
-        size = d.memory.mesh.local_size[d.parent_cell[d.face_cell]]
-        self.per_volume = wetted / np.maximum(d.volume[d.face_cell], wetted * size / STEEPEST)
+    def __init__(self, domain, phi):
+        d = self.domain = domain
+        rows = marked((phi < 0.0)[d.cells[d.face_cell]].any(axis=1))
+        self.cell, self.body = d.face_cell[rows].astype(np.int64), d.face_body[rows].astype(np.int64)
+        self.normal, self.points = d.face_normal[rows], d.face_points[rows]
+        self.hat = hat_values(self.cell, self.points, d.hats, d.nodes)
+        self.arm = self.points - d.body_centre[self.body][:, None]
+        self.area = d.face_area[rows]
+        wetted = np.bincount(self.cell, self.area, minlength=len(d.cells))[self.cell]
+        size = d.memory.mesh.local_size[d.parent_cell[self.cell]]
+        self.per_volume = wetted / np.maximum(d.volume[self.cell], wetted * size / STEEPEST)
 
     def centre(self):
         """Middles (S, 3) [m] of the polygons."""
-        return self.domain.face_points.mean(axis=1)
+        return self.points.mean(axis=1)
 
     def rubbing(self, phi):
         """hat (S, 3, 4) and arm (S, 3, 3) [m] of the points with the hats of the wet corners alone, φ (N,) < 0, scaled
@@ -131,7 +132,6 @@ class Viscosity:
 
     def __init__(self, parameters):
         self.parameters = parameters
-        self.walls: WettedWalls | None = None
         self.friction = None
         if parameters.walls == "friction":
             from fluid.viscous.wall_friction import WallFriction
@@ -148,40 +148,23 @@ class Viscosity:
         V, bodies = water.body_velocity, water.free_bodies or FreeBodies.none(len(water.body_velocity))
         moved, lead = dt * bodies.acceleration, (1.0 - GAMMA) / GAMMA
         half_way, V_half_way = water.velocity + GAMMA * (w - water.velocity), V + GAMMA * moved
-        first, first_V, n1 = self._stage(terms, mass, bodies, dt, half_way, V_half_way)
-        rate1, load1, tank1 = _acting(water, terms, half_way + first, V_half_way + first_V)
-        start, V_start = w + lead * first, V + moved + lead * first_V
-        second, second_V, n2 = self._stage(terms, mass, bodies, dt, start, V_start)
-        u = start + second
-        rate2, load2, tank2 = _acting(water, terms, u, V_start + second_V)
+        matrix = Implicit(terms, mass, GAMMA * dt, (bodies.mass, bodies.moves))
+        first, rate1, load1, tank1 = _stage(water, matrix, half_way, V_half_way)
+        start, V_start = w + lead * first.d, V + moved + lead * first.D
+        second, rate2, load2, tank2 = _stage(water, matrix, start, V_start)
         both = (rate1, rate2), (load1, load2), (tank1, tank2)
         rate, load, tank = ((1.0 - GAMMA) * one + GAMMA * two for one, two in both)
-        change = u - w
-        energy = 0.5 * dt * float((rate * (water.velocity + u)).sum(axis=1).sum())
+        change = lead * first.d + second.d
+        nodes = terms.corners.nodes
+        energy = 0.5 * dt * product_of(nodes, rate, water.velocity + (w + change))
         tank += _held_back(water, terms, mass[:, None] * change / dt - rate)
-        return ViscousChange(change=change, load=load, energy=energy, iterations=n1 + n2, tank=tank)
-
-    def _stage(self, terms, mass, bodies, dt, start, V):
-        """Changes (d, D) of the velocity of the water and of the bodies: (M + γ dt K) (d, D) = γ dt r(start, V)."""
-        tau = GAMMA * dt
-        rate, load = momentum_rate(terms, start, V)
-        d, D, count, left = implicit_change(
-            terms, mass, tau, tau * rate, (bodies.mass, bodies.moves), tau * load, TOLERANCE, MOST_ITERATIONS
-        )
-        if not left <= TOLERANCE:
-            raise NotConverged(
-                f"the viscous step stopped after {count} iterations at a residual of {left:.3g}, "
-                f"wanted {TOLERANCE:.3g}; reduce time.step_max or time.cfl",
-                np.array([left]),
-            )
-        return d, D, count
+        iterations = first.iterations + second.iterations
+        return ViscousChange(change=change, load=load, energy=energy, iterations=iterations, tank=tank)
 
     def _terms(self, water, phi, mass, w, dt):
         t, p = water.topology, self.parameters
-        if self.walls is None or self.walls.domain is not water.domain:
-            self.walls = WettedWalls(water.domain)
         wet = (phi < 0.0) & t.active
-        cells = np.flatnonzero(wet[t.cells].any(axis=1))
+        cells = t.cells_around(wet)
         share = wet_fraction(cells, phi, t.parts)
         cells, share = cells[share > 0.0], share[share > 0.0]
         idle = mass <= 0.0
@@ -191,19 +174,27 @@ class Viscosity:
             drag = self.friction.of_nodes(water, phi, columns, w)
             if columns is not None:
                 viscosity = p.viscosity + p.density * self.friction.mixing(water, columns, cells)
+        walls = self._wall_terms(water, phi, columns, w, cells, share)
+        if np.ndim(viscosity) == 0 and viscosity == 0.0:
+            cells, share = cells[:0], share[:0]  # the walls rub, and the water flows without stress
         weight = 2.0 * viscosity * share * t.volume[cells]
         held, projector = water.held_by_sides()
+        moving = ~idle | (drag != 0.0)
+        moving[t.cells[cells]] = True
+        moving[t.cells[walls.cell]] = True
+        touched = moving[held]
         return ViscousTerms(
             cells=cells,
             weight=weight,
-            walls=self._wall_terms(water, phi, columns, w, cells, share),
+            walls=walls,
             viscosity=p.viscosity,
             node_drag=drag,
-            held=held,
-            projector=projector,
+            held=held[touched],
+            projector=projector[touched],
             idle=idle,
             hats=t.hats,
-            edges=StrainEdges(*edges_of(cells, weight, t.cells, len(phi))),
+            edges=StrainEdges.of(*edges_of(cells, weight, t.cells, len(phi))),
+            corners=NodeCorners.of(cells, t.cells, marked(moving), len(phi)),
             beyond=self._beyond(t, phi, wet, idle),
         )
 
@@ -216,7 +207,7 @@ class Viscosity:
     def _wall_terms(self, water, phi, columns, w, wet_cells, share):
         """The polygons that the water touches, with λ and C; λ is larger where the free surface leaves less water in a
         cell. Friction acts on wet nodes alone, as it does on the sides of the tank."""
-        p, k, cells = self.parameters, self.walls, water.topology.cells
+        p, k, cells = self.parameters, WettedWalls(water.domain, phi), water.topology.cells
         water_share = np.ones(len(cells))
         water_share[wet_cells] = np.maximum(share, 1.0 / STEEPEST)
         wet = k.at_points(phi, cells) < 0.0
@@ -232,13 +223,28 @@ class Viscosity:
         return Walls(*(np.ascontiguousarray(a[use]) for a in found))
 
 
-def _acting(water, terms, u, V):
-    """What acts on the nodes (N, 3) [N] at the velocity u (N, 3), as far as sides let them go; the loads (n_bodies, 6)
-    on bodies with the velocity V, and (6,) of the sides of the tank on the water."""
+def _stage(water, matrix, u, V):
+    """Change (d, D) of the velocity u (N, 3) of the water and V (n_bodies, 6) of the bodies, (M + γ dt K) (d, D) =
+    γ dt r(u, V); and what acts at its end on the nodes (N, 3) [N], as far as sides let them go, on the bodies
+    (n_bodies, 6), and from the sides of the tank on the water (6,).
+
+    Raises NotConverged."""
+    terms, tau = matrix.terms, matrix.tau
     free, load = unheld_rate(terms, u, V)
+    rate = free.copy()
+    hold_rate(terms, u, rate)
+    hand_in(terms, rate)
+    found = matrix.solve(tau * rate, tau * load, TOLERANCE, MOST_ITERATIONS)
+    if not found.left <= TOLERANCE:
+        raise NotConverged(
+            f"the viscous step stopped after {found.iterations} iterations at a residual of {found.left:.3g}, "
+            f"wanted {TOLERANCE:.3g}; reduce time.step_max or time.cfl",
+            np.array([found.left]),
+        )
+    free += found.rate
     held = free.copy()
-    hold_rate(terms, u, held)
-    return held, load, _moments(water, held - free)
+    hold_rate(terms, u + found.d, held)
+    return found, held, load + found.load, _moments(water, terms, held - free)
 
 
 def _held_back(water, terms, missing):
@@ -248,9 +254,10 @@ def _held_back(water, terms, missing):
         return np.zeros(6)
     hand_on(terms.beyond, missing)
     left = missing.copy()
-    restrict(left, terms.held, terms.projector, terms.idle)
-    return _moments(water, missing - left)
+    restrict(terms, left)
+    return _moments(water, terms, missing - left)
 
 
-def _moments(water, force):
-    return momentum_of(np.ones(len(force)), force, water.topology.nodes - water.reference)
+def _moments(water, terms, force):
+    nodes = terms.corners.nodes
+    return momentum_of_rows(nodes, 1.0, np.ones(len(force)), force, water.topology.nodes, water.reference)

@@ -28,14 +28,16 @@ Roughness and n are numbers, or functions of x and y (n,) [m] → (n,) for beds 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from array_types import Floats
-from fluid.domain.moments import wet_fraction
-from fluid.numerics.cube_root import cube_root
+from fluid.numerics.cube_root import cube_root, root_of
+from fluid.viscous.columns import Columns
+from kernels.decorators import ranged
+from kernels.threads import over
 
 KARMAN = 0.41
 OFF_WALL = np.exp(-1.5)
@@ -45,6 +47,8 @@ LOOKS_UP = 0.5
 """Least upward part of the unit normal of a bed."""
 SLOWEST = 0.25
 """Least velocity assumed for the water at the bed, as a share of the mean velocity; it bounds the factor."""
+MIXED = 5
+"""Cost of equation (3) for one cell, in usual rows."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,8 @@ class WallFriction:
     def of_nodes(self, water, phi, columns, u):
         """Drag (N,) [kg/s] of the nodes on closed sides of the tank: C times the wet area of each."""
         t, w = water.topology, water.walls
-        faces, area, cell = w.rough_faces, w.rough_area, w.rough_cell
+        some = (phi[w.rough_faces] < 0.0).any(axis=1)
+        faces, area, cell = w.rough_faces[some], w.rough_area[some], w.rough_cell[some]
         size = np.linalg.norm(area, axis=1)
         unit = area / np.maximum(size, 1e-300)[:, None]
         if columns is not None:
@@ -105,7 +110,7 @@ class WallFriction:
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
             depth, velocity, left = columns.over(cell)
             mean = np.linalg.norm(_along(velocity, unit), axis=1)
-        centre = t.nodes[faces].mean(axis=1)
+        centre, least = t.nodes[faces].mean(axis=1), water.mesh.local_size[t.background[cell]]
         drag = np.zeros(len(phi))
         for corner in range(3):
             node = faces[:, corner]
@@ -113,7 +118,6 @@ class WallFriction:
             if columns is None:
                 factor = log_law(OFF_WALL * t.size[cell], _at(self.roughness, centre)) * speed
             else:
-                least = water.mesh.local_size[t.background[cell]]
                 factor = self._bed(depth, least, centre, mean, left * speed)
             np.add.at(drag, node, np.where(phi[node] < 0.0, self.density * factor * size / 3.0, 0.0))
         return drag
@@ -121,10 +125,13 @@ class WallFriction:
     def mixing(self, water, columns, cells):
         """ν_t (n,) [m²/s] of equation (3) in cells (n,) of the domain."""
         t, (depth, velocity, _) = water.topology, columns.over(cells)
-        depth = np.maximum(depth, water.mesh.local_size[t.background[cells]])
-        friction = self._factor(depth, t.nodes[t.cells[cells]].mean(axis=1))
-        speed = np.linalg.norm(velocity[:, :2], axis=1)
-        return np.sqrt(friction) * speed * depth * np.maximum(KARMAN / 6.0, 2.0 / 3.0 * np.sqrt(friction))
+        rough, out = self.manning, np.empty(len(cells))
+        if callable(rough):
+            rough = _at(rough, t.nodes[t.cells[cells]].mean(axis=1))
+        least = water.mesh.local_size[t.background[cells]]
+        rough = np.atleast_1d(np.asarray(rough, float))
+        over(_mixing, len(cells), depth, least, velocity, rough, self.gravity, out, weight=MIXED)
+        return out
 
     def _bed(self, depth, least, place, mean, there):
         """C_f |U|² / |u| (n,) [m/s]: mean (n,) [m/s] is |U|, there (n,) [m/s] the velocity at the bed."""
@@ -133,6 +140,16 @@ class WallFriction:
 
     def _factor(self, depth, place):
         return self.gravity * _at(self.manning, place) ** 2 / cube_root(depth)
+
+
+@ranged
+def _mixing(first, last, depth, least, velocity, rough, gravity, out):
+    """Equation (3); rough: n of all cells, or of each."""
+    for s in range(first, last):
+        n, d = rough[s if rough.shape[0] > 1 else 0], max(depth[s], least[s])
+        root = math.sqrt(gravity * n**2 / root_of(d))
+        speed = math.sqrt(velocity[s, 0] ** 2 + velocity[s, 1] ** 2)
+        out[s] = root * speed * d * max(KARMAN / 6.0, 2.0 / 3.0 * root)
 
 
 def _at(value, place):
@@ -148,45 +165,6 @@ def _along(u, normal):
 def log_law(distance, roughness: float):
     """C_f of equation (1); distance (n,) [m], roughness k_s [m]."""
     return (KARMAN / np.log1p(30.0 * distance / roughness)) ** 2
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Columns of water over the bins of the plan: depth (c,) [m], volume over the area that solids leave open
-    (`OpenColumns`) · velocity (c, 3) [m/s], mean over the water · left (c,): share of the velocity that friction leaves
-    · centre (c, 2) [m] · of_water: the Water they belong to."""
-
-    depth: Floats
-    velocity: Floats
-    left: Floats
-    centre: Floats
-    of_water: object
-
-    @classmethod
-    def of(cls, water, phi, u) -> Columns:
-        """Surface phi (N,), velocity u (N, 3) [m/s]."""
-        t, (x, y, _) = water.topology, water.mesh.axes
-        wet = t.cells_around(phi < 0.0)
-        area = np.outer(np.diff(x), np.diff(y)).ravel()
-        there, held = _columns(water, wet).T, t.volume[wet] * wet_fraction(wet, phi, t.parts)
-        a, b, c, d = t.cells[wet].T
-        volume, total = there @ held, there @ (held[:, None] * (0.25 * (u[a] + u[b] + u[c] + u[d])))
-        middle = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
-        centre = np.column_stack([a.ravel() for a in middle])
-        mean = total / np.maximum(volume, 1e-300)[:, None]
-        depth = water.domain.open_columns.depth(volume, area)
-        return cls(depth, mean, np.ones(len(area)), centre, water)
-
-    def over(self, cells):
-        """Depth (n,) [m], velocity (n, 3) [m/s] and share left (n,) of the columns that cells (n,) of the domain stand
-        in, means by `Background.plan`."""
-        there = _columns(self.of_water, cells)
-        return there @ self.depth, there @ self.velocity, there @ self.left
-
-
-def _columns(water, cells):
-    """`Background.plan` of cells (n,) of the domain."""
-    return water.mesh.plan[water.topology.background[cells]]
 
 
 def _rigid_velocity(water, walls):

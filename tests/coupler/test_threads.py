@@ -1,5 +1,6 @@
 """Threads share the work of a step and change nothing: a run has the same bits at any number of them."""
 
+import copy
 import os
 import signal
 import subprocess
@@ -54,6 +55,26 @@ def test_a_coupled_run_has_the_same_bytes_at_one_to_four_threads(tmp_path, divid
     for number in (2, 3, 4):
         assert _bytes_of(number, tmp_path, divided) == alone
         assert len(kernels._team.workers) >= number - 1
+
+
+@pytest.mark.parametrize(
+    "shear",
+    [
+        {"walls": "friction", "manning": 0.03},
+        {"walls": "friction", "roughness": "1 cm"},
+        {"walls": "no-slip", "viscosity": "5 Pa s"},
+    ],
+    ids=["manning", "log law", "viscosity"],
+)
+def test_water_that_rubs_has_the_same_bytes_at_one_and_three_threads(tmp_path, divided, shear):
+    """The viscous stage with a bed, with rough blocks, and with blocks that the liquid sticks to."""
+    scene = copy.deepcopy(SCENE)
+    scene["time"] |= {"end": "0.04 s", "output_every": "20 ms"}
+    scene["water"] |= shear
+    alone = _bytes_of(1, tmp_path, divided, scene)
+    taken = surgebreak.Run(tmp_path / "1").history("energy")["shear_dissipation"]
+    assert taken[-1] > 0.0
+    assert _bytes_of(3, tmp_path, divided, scene) == alone
 
 
 FALL = tomllib.loads(PARTS["structure"])

@@ -12,7 +12,8 @@ from fluid.sides.inflow import Side, Sides
 from fluid.sides.waves import steady
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
-from fluid.viscous.wall_friction import Columns, WallFriction
+from fluid.viscous.columns import Columns
+from fluid.viscous.wall_friction import WallFriction
 from tests.fluid.scenes import advance
 
 DRY = ConvexBodies.empty()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fluid.viscous.beyond import follow
-from fluid.viscous.kernels import hold_rate, implicit_change, momentum_rate, unheld_rate
+from fluid.viscous.kernels import hold_rate, momentum_rate, unheld_rate
+from fluid.viscous.solve import Implicit
 from fluid.viscous.viscosity import Viscosity
 from tests.fluid.scenes import advance, tank
 from tests.fluid.test_viscosity import DENSITY, turned_box
@@ -94,9 +95,12 @@ def test_the_stage_with_nodes_beyond_the_surface_is_the_dense_one():
     np.testing.assert_allclose(rate, held * (E.T @ free), atol=1e-9 * np.abs(free).max())
     tau = 1e-3
     fixed = (np.zeros((len(none), 6, 6)), np.zeros(len(none), bool))
-    d, _, _, left = implicit_change(terms, mass, tau, tau * rate, fixed, none, 1e-10, 1000)
-    assert left <= 1e-10
-    change, _ = unheld_rate(terms, d, none)
+    found = Implicit(terms, mass, tau, fixed).solve(tau * rate, none, 1e-10, 1000)
+    d = found.d
+    assert found.left <= 1e-10
+    change, load = unheld_rate(terms, d, none)
+    np.testing.assert_allclose(found.rate, change, atol=1e-12 * np.abs(change).max())
+    np.testing.assert_allclose(found.load, load, atol=1e-12 * np.abs(load).max())
     hold_rate(terms, d, change)
     missed = held * (E.T @ (held * (mass[:, None] * d - tau * change))) - tau * rate
     assert np.abs(missed).max() < 1e-8 * np.abs(tau * rate).max()

@@ -9,7 +9,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fluid.numerics.cube_root import cube_root
+from fluid.numerics.cube_root import cube_root, root_of
+from kernels.decorators import kernel
 
 PRINT_ROOTS = """
 import numpy as np
@@ -36,6 +37,19 @@ def test_error_is_below_one_unit_in_the_last_place():
         for value, root in zip(x, cube_root(x)):
             error = abs(Decimal(root) - Decimal(value) ** third)
             assert error < Decimal("0.7") * Decimal(np.spacing(root))
+
+
+@kernel
+def roots_of(x):
+    """`root_of` each of x (n,)."""
+    out = np.empty_like(x)
+    for k in range(len(x)):
+        out[k] = root_of(x[k])
+    return out
+
+
+def test_kernels_have_the_same_root():
+    np.testing.assert_array_equal(roots_of(spread(3000)), cube_root(spread(3000)))
 
 
 def test_cubes_of_whole_numbers_have_their_exact_root():

@@ -26,7 +26,7 @@ from fluid.pressure.projection import (
 )
 from fluid.transport import forms
 from fluid.viscous.kernels import Walls, wall_stress
-from fluid.viscous.strain import StrainEdges, edge_strain, spread_stress
+from fluid.viscous.strain import NodeCorners, StrainEdges, edge_strain, spread_stress
 from tests.fluid import reference_forms
 from tests.fluid.scenes import tank
 
@@ -164,17 +164,21 @@ def test_viscous_stress(n, seed, covers):
     domain = cut(n, seed, covers)
     t, cells, u = laid_out(domain)
     rate, weight = np.zeros_like(u), 2.0 * 0.7 * t.volume
-    edge = _unshared_edges(len(cells))
-    strain = edge_strain(cells, weight, StrainEdges(edge, weight), u, t.hats)
-    spread_stress(cells, weight, edge, strain, t.hats, rate)
+    edges, corners = _unshared_edges(weight), _corners(t, cells)
+    strain = edge_strain(cells, weight, edges, u, t.hats)
+    spread_stress(cells, weight, edges, corners, strain, t.hats, rate)
     vector = reference_forms.vector_basis_of(domain)
     stiffness = asm(reference_forms.viscous, vector, mu=0.7)
     same(-rate, (stiffness @ reference_forms.by_component(u)).reshape(-1, 3))
 
 
-def _unshared_edges(n):
-    """Edges (n, 6) that each cell has for itself: nothing is smoothed, as in the forms."""
-    return np.repeat(np.arange(n)[:, None], 6, axis=1)
+def _unshared_edges(weight):
+    """Edges that each cell has for itself: nothing is smoothed, as in the forms."""
+    return StrainEdges.of(np.repeat(np.arange(len(weight))[:, None], 6, axis=1), weight)
+
+
+def _corners(t, cells):
+    return NodeCorners.of(cells, t.cells, np.arange(len(t.nodes)), len(t.nodes))
 
 
 @EXAMPLES
@@ -204,11 +208,12 @@ def test_stress_on_wetted_faces(n, seed, covers):
     )
     rate, load = np.zeros_like(u), np.zeros((domain.n_bodies, 6))
     still = np.zeros((domain.n_bodies, 6))
-    edge, weight = _unshared_edges(len(cells)), 2.0 * 0.7 * t.volume
-    strain = edge_strain(cells, weight, StrainEdges(edge, weight), u, t.hats)
+    weight = 2.0 * 0.7 * t.volume
+    edges, corners = _unshared_edges(weight), _corners(t, cells)
+    strain = edge_strain(cells, weight, edges, u, t.hats)
     flux = np.zeros_like(strain)
-    wall_stress(walls, 0.7, u, still, StrainEdges(edge, weight), (strain, flux), t.cells, rate, load)
-    spread_stress(cells, weight, edge, flux, t.hats, rate)
+    wall_stress(walls, 0.7, u, still, edges, (strain, flux), t.cells, rate, load)
+    spread_stress(cells, weight, edges, corners, flux, t.hats, rate)
     form = asm(reference_forms.nitsche, basis, mu=0.7, n=normal, penalty=forms.per_cell(basis, penalty))
     reached = form.shape[0] // 3  # scikit-fem numbers nodes up to the highest one of its cells
     same(-rate[:reached], (form @ reference_forms.by_component(u[:reached])).reshape(-1, 3))

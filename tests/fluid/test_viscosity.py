@@ -14,9 +14,10 @@ from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from fluid.surface.extrapolation import extend_velocity
 from fluid.viscous.beyond import Beyond
+from fluid.viscous.columns import Columns
 from fluid.viscous.kernels import momentum_rate
 from fluid.viscous.viscosity import Viscosity
-from fluid.viscous.wall_friction import Columns, WallFriction, log_law
+from fluid.viscous.wall_friction import WallFriction, log_law
 from tests.fluid.scenes import advance, rotation, tank
 
 DENSITY = 1000.0
