@@ -27,7 +27,7 @@ from fluid.numerics.fields import places_of
 from fluid.surface.shift import diffused_shift
 from fluid.surface.volume import Shift
 from kernels.decorators import kernel, ranged, released
-from kernels.threads import over, zeros
+from kernels.threads import over
 
 CONDUCTING, ANCHOR = 0.05, 0.02
 """Of the matrix of (2): share of what a node can hold from which water passes through it as everywhere, so that nodes
@@ -44,49 +44,56 @@ def pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> No
     that they gain the first less the second and more the third · share (N,) of its rest that is passed on · water,
     capacity (N,) [m³]: what the nodes hold before, and could hold."""
     n, edges, spacing, band = len(water), graph.edges, shift.spacing, shift.band
-    held, height = np.maximum(water, 0.0), zeros((n,))
-    height[band] = shift.kappa * shift.value
-    _down(band, edges, height, spacing, capacity, held, u)
+    held, place = np.empty(n), places_of(band, n)
+    over(_at_least_none, n, water, held)
+    _down(band, place, edges, shift.kappa * shift.value, spacing, capacity, held, u)
     sought = np.empty(len(band))
     if not sum(over(_sought, len(band), band, gained, share, (water, held), sought)):
         return
     stiffness, anchor = np.empty(len(edges.stiffness)), np.empty(len(band))
     over(_through_water, len(band), band, edges, spacing, (held, gained[0], capacity), (stiffness, anchor))
     edges = edges._replace(stiffness=stiffness)
-    height = zeros((n,))
-    height[band] = diffused_shift(
-        band, places_of(band, n), edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS
-    )
-    _down(band, edges, height, spacing, capacity, held, u)
+    height = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
+    _down(band, place, edges, height, spacing, capacity, held, u)
 
 
-def _down(band, edges, height, spacing, capacity, held, u):
-    """The volumes (1) of the potential `height` (N,) within the band (n,), handed on: held (N,) [m³] and u in place."""
-    inside, n = np.zeros(len(height), bool), len(height)
-    inside[band] = True
-    order = band[np.argsort(-height[band], kind="stable")]
-    _hand_on(order, edges, (height, inside, spacing), capacity, held, np.zeros((n, 4)), u)
+@ranged
+def _at_least_none(first, last, water, out):
+    """max(W, 0)."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        out[i] = max(water[i], 0.0)
+
+
+def _down(band, place, edges, height, spacing, capacity, held, u):
+    """The volumes (1) of the potential `height` (n,) at the band (n,), handed on: held (N,) [m³] and u in place.
+
+    place (N,): places of the nodes in the band, -1 elsewhere."""
+    order = np.argsort(-height, kind="stable")
+    _hand_on(order, band, place, edges, (height, spacing), capacity, held, np.zeros((len(band), 4)), u)
 
 
 @kernel
-def _hand_on(order, edges, state, capacity, held, came, u):
-    """state: potential (N,), inside (N,) bool: the nodes of the order, size (N,) [m] of the cells · came (N, 4), zero
-    at first: momentum and volume that has come."""
-    (height, inside, spacing), start, neighbour = state, edges.start, edges.neighbour
+def _hand_on(order, band, place, edges, state, capacity, held, came, u):
+    """order (n,): places in the band by falling potential · state: potential (n,), size (N,) [m] of the cells · came
+    (n, 4), zero at first: momentum and volume that has come."""
+    (height, spacing), start, neighbour = state, edges.start, edges.neighbour
     stiffness = edges.stiffness
     for s in range(order.shape[0]):
-        i = order[s]
-        left = held[i] + came[i, 3]
+        p = order[s]
+        i = band[p]
+        left = held[i] + came[p, 3]
         if left <= NO_WATER * capacity[i]:
             held[i] = left
             continue
         for k in range(3):
-            u[i, k] = (held[i] * u[i, k] + came[i, k]) / left
+            u[i, k] = (held[i] * u[i, k] + came[p, k]) / left
         begin, end, total = start[edges.row[i]], start[edges.row[i] + 1], 0.0
         for t in range(begin, end):
             j = neighbour[t]
-            if inside[j] and height[j] < height[i]:
-                down = 0.5 * (spacing[i] + spacing[j]) * (height[i] - height[j])
+            q = place[j]
+            if q >= 0 and height[q] < height[p]:
+                down = 0.5 * (spacing[i] + spacing[j]) * (height[p] - height[q])
                 total += down * max(-stiffness[t], 0.0)
         held[i] = left
         if total <= 0.0:
@@ -95,12 +102,13 @@ def _hand_on(order, edges, state, capacity, held, came, u):
         held[i] = max(left - share * total, 0.0)
         for t in range(begin, end):
             j = neighbour[t]
-            if inside[j] and height[j] < height[i] and stiffness[t] < 0.0:
-                down = 0.5 * (spacing[i] + spacing[j]) * (height[i] - height[j])
+            q = place[j]
+            if q >= 0 and height[q] < height[p] and stiffness[t] < 0.0:
+                down = 0.5 * (spacing[i] + spacing[j]) * (height[p] - height[q])
                 moved = share * down * -stiffness[t]
-                came[j, 3] += moved
+                came[q, 3] += moved
                 for k in range(3):
-                    came[j, k] += moved * u[i, k]
+                    came[q, k] += moved * u[i, k]
 
 
 @released

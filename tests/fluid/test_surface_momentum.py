@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fluid.numerics.fields import places_of
 from fluid.step.carried import carried_by_fluxes
 from fluid.surface.volume import Shift
 from fluid.transport.passed_on import _down, pass_on
@@ -140,15 +141,8 @@ def test_a_node_that_holds_next_to_nothing_hands_on_all_that_comes_to_it():
         held[(np.abs(x - 1.0) < 0.01) & (emptied > 0.0)] *= 2e-6
         u[:, 0], u[:, 1] = np.where(x < 0.95, 1.0, 0.0), np.sin(5.0 * x)
         total, before, below = held.sum(), held @ u, held[x > 1.05].sum()
-        _down(
-            band,
-            water.graph_for(band).edges,
-            -0.02 * np.clip(x, 0.5, 1.5),
-            t.node_size,
-            t.node_volume,
-            held,
-            u,
-        )
+        height, edges = -0.02 * np.clip(x[band], 0.5, 1.5), water.graph_for(band).edges
+        _down(band, places_of(band, len(x)), edges, height, t.node_size, t.node_volume, held, u)
         assert held.min() >= 0.0
         assert held.sum() == pytest.approx(total, rel=1e-12)
         np.testing.assert_allclose(held @ u, before, atol=1e-12 * total)
