@@ -160,7 +160,9 @@ def predicted(water, dt: float) -> PressureProblem:
     calm = water.calm(dt, crossing)
     held = added(carried, displaced)
     phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, water.on_one_side)
-    surface = _new_surface(water, calm, crossing, phi, held, conserved + beside)
+    surface = _new_surface(
+        water, calm, share_of_fast(water.in_waves(crossing)), phi, held, conserved + beside
+    )
     in_jumps = None
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
@@ -256,8 +258,8 @@ def _taken_over(first, last, listed, moved, finer, width, u, phi):
             phi[i] = moved[s, 3]
 
 
-def _new_surface(water, calm, crossing, phi, carried, conserved):
-    """φ corrected: VolumeCorrection. calm: `Water.calm` · crossing [m/s]: `Water.crossing`."""
+def _new_surface(water, calm, fast, phi, carried, conserved):
+    """φ corrected: VolumeCorrection. calm: `Water.calm` · fast: `share_of_fast` of the fastest water."""
     p = water.parameters
     length = p.correction_length + (p.calm_correction_length - p.correction_length) * calm
     return correct_volume(
@@ -269,7 +271,7 @@ def _new_surface(water, calm, crossing, phi, carried, conserved):
         conserved,
         length,
         water.topology.node_size,
-        share_of_fast(crossing / np.sqrt(p.gravity * water.mesh.spacing)),
+        fast,
     )
 
 

@@ -180,6 +180,14 @@ class Water:
         time of one of the spacing."""
         return fastest_wet(self._cells_crossed(), self.level_set, self._roomy)
 
+    def in_waves(self, crossing: float) -> float:
+        """Largest component of the velocity of the water over √(g h), the speed of the shallow-water wave of one of the
+        cells there, of size h. crossing [m/s]: `crossing`."""
+        t, spacing = self.topology, self.mesh.spacing
+        if not t.is_uniform:
+            crossing = fastest_wet(self.velocity * np.sqrt(t.finer)[:, None], self.level_set, self._roomy)
+        return float(crossing / np.sqrt(self.parameters.gravity * spacing))
+
     def stable_step(self) -> float:
         """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
         h, t = self.mesh.spacing, self.topology
