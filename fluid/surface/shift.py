@@ -2,9 +2,9 @@
 
     (c + κ K) ψ = W - ∫_{φ<0} N dV
 
-(`volume.py`, 2; again with what water passes on around jumps, `transport/surface_momentum.py`), by conjugate gradients
-with the diagonal as preconditioner. Their loops are short, some thirty times three of them a step, and follow one
-another in compiled code."""
+(`volume.py`, 2; again with what passes on in fast water and around jumps, `transport/passed_on.py`), by conjugate
+gradients with the diagonal as preconditioner. Their loops are short, some thirty times three of them a step, and follow
+one another in compiled code."""
 
 from __future__ import annotations
 

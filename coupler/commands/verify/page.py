@@ -97,9 +97,9 @@ ALWAYS = {
     "lee; with all cells counted alike in the pressure beyond the surface ([theory](theory.md#22-step)) "
     "0.079, 0.077, 0.071 and 0.077 m, and 0.091, 0.093, 0.073 and 0.080 m. So small a change decides about "
     "a centimetre: one run says no more than that both are within about 20 % (0.091 m is 23 % too high), "
-    "and not which weight is better. With the second correction of the level set in fast water it is 0.082 m facing "
-    "the wave and 0.083 m in the lee where fast is judged by the mean size of the cells, and 0.093 and 0.094 m by "
-    "that of the cells at hand, as it is, since a dam break on fine cells must be the same beside coarse ones.",
+    "and not which weight is better. Since fast water keeps the momentum of "
+    "what the level set hands on, the run-up facing the wave is 0.082 or 0.093 m and that in the lee 0.083 to 0.094 m, "
+    "depending on how the speed is judged from which the level set is corrected a second time.",
 }
 """What has to be known to judge the figures of a case, whether it passes or not."""
 
