@@ -138,5 +138,5 @@ def _through_water(first, last, band, edges, spacing, volumes, made):
             j = edges.neighbour[s]
             least = min(own, max(max(now[j], in_the_end[j]), 0.0) / max(capacity[j], 1e-300))
             stiffness[s] = edges.stiffness[s] * min(least / CONDUCTING, 1.0)
-            total -= 0.5 * (spacing[i] + spacing[j]) * stiffness[s]
+            total -= 0.5 * (spacing[i] + spacing[j]) * min(stiffness[s], 0.0)
         anchor[r] = ANCHOR * total
