@@ -10,6 +10,15 @@ Riemann invariants (Stoker, Water Waves, 1957, 10.2): with h the depth and u the
 This is exact for long waves of any height at normal incidence; dispersive or oblique waves are partly reflected.
 Over a bed that varies along the side h is the wet area over the wet width.
 
+A side that draws water speeds up by at most a quarter of gravity, unless the water inside runs out faster already,
+
+    u_side >= min(0, u_side before - dt g / 4, u),  sqrt(g h_side) = (R_out + u_side) / 2              (1a)
+
+with the depth at which the outgoing wave passes a side of that velocity.  A wall that leaves water of depth h with the
+acceleration a lowers its pressure at the depth d by 7/8 rho a sqrt(h d) (Westergaard, Trans. ASCE 98, 1933), which is
+more than rho g d down to d = 0.77 (a/g)^2 h.  As water does not pull, it comes off the wall there: in the upper
+twentieth with a quarter of gravity, everywhere where the velocity of the side jumps, as (1) has it beside a step.
+
 Discharge: q = u h of the given flow is kept, and the water inside sets the depth, as at the upstream end of every
 subcritical stream (Cunge, Holly and Verwey, Practical Aspects of Computational River Hydraulics, 1980, 2.5),
 
@@ -64,6 +73,8 @@ def kept_discharge(
     return depth, q / depth
 
 
+DRAWING = 0.25
+"""Largest acceleration outwards of a side that draws water, over that of gravity: equation (1a)."""
 MOST_STEPS = 60
 """Steps of Newton's method for equation (2), which begins at most three times as far as the root."""
 
@@ -101,9 +112,9 @@ class Absorber:
         """Points (k, 3) [m] at which `update` needs the velocity: at half the depths (k,) [m]."""
         return np.column_stack([self.places, self.bed + 0.5 * depths])
 
-    def update(self, depths, velocities, time: float) -> None:
-        """Update height and speed by the law from the depths (k,) [m] and velocities (k, 3) [m/s] at the
-        places."""
+    def update(self, depths, velocities, time: float, dt: float) -> None:
+        """Update height and speed by the law from the depths (k,) [m] and velocities (k, 3) [m/s] at the places; the
+        side holds them for a step of dt [s], 0 at the start, where still water has not been drawn yet."""
         level = self.flow.level_at(np.column_stack([self.places, self.bed]), time)
         given = np.maximum(level - self.bed, 0.0)
         wet = (given > 0.0) | (depths > 0.0)
@@ -116,4 +127,8 @@ class Absorber:
         along = self.flow.velocity(self.points(given), time) @ self.inward
         u_given = float((given / max(given.sum(), 1e-300)) @ along)
         depth, speed = self.law(h_given, u_given, h_inside, u_inside, self.gravity)
+        slowest = min(0.0, u_given + self.speed - DRAWING * self.gravity * dt, u_inside)
+        if speed < slowest:
+            out = -u_inside + 2.0 * np.sqrt(self.gravity * h_inside)
+            depth, speed = max(0.5 * (out + slowest), 0.0) ** 2 / self.gravity, slowest
         self.height, self.speed = float(depth - h_given), float(speed - u_given)

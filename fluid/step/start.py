@@ -35,7 +35,7 @@ def start_beside_sides(water: Water, level, given, velocity) -> None:
     absorbers, close = water.sides.absorbers(), AT_LEVEL * water.mesh.spacing
     for _ in range(MOST_READINGS):
         heights = [absorber.height for absorber in absorbers]
-        water.read_absorbing_sides()
+        water.read_absorbing_sides(0.0)
         for absorber in absorbers:
             if abs(absorber.height) < close:
                 absorber.height = absorber.speed = 0.0

@@ -265,11 +265,12 @@ class Water:
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure. Nothing of the state changes but
         what absorbing sides have read."""
-        self.read_absorbing_sides()
+        self.read_absorbing_sides(dt)
         return predicted(self, dt)
 
-    def read_absorbing_sides(self) -> None:
-        """Read depth and velocity beside the absorbing sides, which keep what they read, so that a restart has it."""
+    def read_absorbing_sides(self, dt: float) -> None:
+        """Read depth and velocity beside the absorbing sides before a step of dt [s], 0 at the start; they keep what
+        they read, so that a restart has it."""
         for absorber in () if self.sides is None else self.sides.absorbers():
             from fluid.readings.gauges import levels, velocity
 
@@ -277,7 +278,7 @@ class Water:
             wet, velocities = depths > 0.0, np.zeros((len(depths), 3))
             if wet.any():
                 velocities[wet] = velocity(self, absorber.points(depths)[wet])
-            absorber.update(depths, velocities, self.time)
+            absorber.update(depths, velocities, self.time, dt)
 
     def correct(self, problem: PressureProblem, x, parting=None) -> None:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the

@@ -6,7 +6,7 @@ import pytest
 from fluid.sides.absorbing import Absorber, kept_discharge
 from fluid.sides.waves import n_wave, steady
 
-G, DEPTH = 9.81, 2.0
+G, DEPTH, STEP = 9.81, 2.0, 0.02
 INWARD = np.array([1.0, 0.0, 0.0])
 PLACES = np.array([[0.5, 0.0], [0.5, 1.0]])
 
@@ -25,7 +25,7 @@ def simple_wave(height):
 def test_long_wave_of_any_height_goes_out_as_if_the_water_went_on(height):
     h, u = simple_wave(height)
     side = absorber(steady(INWARD, DEPTH - 5.0, 0.0), bed=-5.0)
-    side.update(np.full(2, h), np.tile(-u * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, h), np.tile(-u * INWARD, (2, 1)), 0.0, STEP)
     flow = side.as_flow()
     assert flow.level(0.0) == pytest.approx(h - 5.0)
     np.testing.assert_allclose(flow.velocity(np.zeros((3, 3)), 0.0), np.tile(-u * INWARD, (3, 1)), atol=1e-12)
@@ -34,7 +34,7 @@ def test_long_wave_of_any_height_goes_out_as_if_the_water_went_on(height):
 def test_given_wave_alone_is_left_as_it_is():
     h, u = simple_wave(0.4)
     side = absorber(steady(INWARD, h, u))
-    side.update(np.full(2, h), np.tile(u * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, h), np.tile(u * INWARD, (2, 1)), 0.0, STEP)
     assert side.height == pytest.approx(0.0, abs=1e-12)
     assert side.speed == pytest.approx(0.0, abs=1e-12)
 
@@ -45,7 +45,7 @@ def test_wave_that_comes_in_and_one_that_goes_out_pass_each_other():
     c = np.sqrt(G * DEPTH)
     side = absorber(steady(INWARD, DEPTH + a, c * a / DEPTH))
     velocity = c * (a - b) / DEPTH
-    side.update(np.full(2, DEPTH + a + b), np.tile(velocity * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, DEPTH + a + b), np.tile(velocity * INWARD, (2, 1)), 0.0, STEP)
     assert side.height == pytest.approx(b, rel=1e-3)
     assert side.speed == pytest.approx(-c * b / DEPTH, rel=1e-3)
 
@@ -53,14 +53,34 @@ def test_wave_that_comes_in_and_one_that_goes_out_pass_each_other():
 def test_water_that_circulates_over_an_uneven_bed_brings_nothing():
     """Out over the deep half, back twice as fast over the shallow one: what counts is the flow, not the mean speed."""
     side = Absorber(steady(INWARD, DEPTH, 0.0), INWARD, PLACES, np.array([0.0, DEPTH / 2]), G)
-    side.update(np.array([DEPTH, DEPTH / 2]), np.array([-1.0, 2.0])[:, None] * INWARD, 0.0)
+    side.update(np.array([DEPTH, DEPTH / 2]), np.array([-1.0, 2.0])[:, None] * INWARD, 0.0, STEP)
     assert side.height == pytest.approx(0.0, abs=1e-12)
     assert side.speed == pytest.approx(0.0, abs=1e-12)
 
 
+def test_still_water_above_the_level_of_a_side_is_drawn_no_faster_than_it_can_follow():
+    """Water comes off a wall that leaves it faster than some quarter of gravity: it does not pull.  While the side has
+    no speed yet, it is as deep as the water, and in the end it has what the long waves lead to."""
+    side, still = absorber(steady(INWARD, DEPTH, 0.0)), np.zeros((2, 3))
+    for step in range(3):
+        side.update(np.full(2, 1.5 * DEPTH), still, step * STEP, STEP if step else 0.0)
+        assert side.speed == pytest.approx(-0.25 * G * step * STEP)
+        out = np.sqrt(G * 1.5 * DEPTH) + 0.5 * side.speed
+        assert side.height == pytest.approx(out**2 / G - DEPTH)
+    side.update(np.full(2, 1.5 * DEPTH), still, 1.0, 10.0)
+    assert side.speed == pytest.approx(np.sqrt(G * DEPTH) - np.sqrt(G * 1.5 * DEPTH))
+
+
+def test_a_front_that_runs_out_is_let_go_at_once():
+    side = absorber(steady(INWARD, DEPTH, 0.0))
+    h, u = simple_wave(0.4)
+    side.update(np.full(2, h), np.tile(-u * INWARD, (2, 1)), 0.0, 1e-6)
+    assert side.speed == pytest.approx(-u)
+
+
 def test_dry_side_brings_nothing():
     side = absorber(steady(INWARD, -1.0, 0.0))
-    side.update(np.zeros(2), np.zeros((2, 3)), 0.0)
+    side.update(np.zeros(2), np.zeros((2, 3)), 0.0, STEP)
     assert (side.height, side.speed) == (0.0, 0.0)
 
 
@@ -113,7 +133,7 @@ def test_a_fast_stream_brings_its_depth_until_a_jump_reaches_its_side():
 
 def test_side_that_keeps_its_discharge_moves_level_and_speed_together():
     side = Absorber(steady(INWARD, DEPTH, 0.5), INWARD, PLACES, np.zeros(2), G, kept_discharge)
-    side.update(np.full(2, 1.2 * DEPTH), np.tile(0.4 * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, 1.2 * DEPTH), np.tile(0.4 * INWARD, (2, 1)), 0.0, STEP)
     flow = side.as_flow()
     assert side.height > 0.1 * DEPTH
     assert flow.level(0.0) * flow.velocity(np.zeros((1, 3)), 0.0)[0, 0] == pytest.approx(0.5 * DEPTH)
