@@ -6,7 +6,7 @@ checkpoint, resume, array_file, fingerprint        saved states, and whether the
 progress, pace                                     reports while it runs, and the time left
 stop, within_step                                  the user's request to stop
 clock, left_out                                    processor time by part, and parts that were not computed
-forecast, trapped_air, fast_openings               steps, memory and disk of a run before it begins; its air and joints
+forecast, cost, trapped_air, fast_openings         what a run will take, before it begins; its air and its joints
 compile_ahead                                      the kernels of a case, compiled before its run
 
 docs/how_it_runs.md describes it.  Imports `checks` and the chapters below it.

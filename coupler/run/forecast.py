@@ -18,14 +18,16 @@ from coupler.case.inflow_records import record_of
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.places import mesh_size
 from coupler.geometry import start_surfaces
-from coupler.geometry.tank_mesh import finest_cell, water_in
+from coupler.geometry.tank_mesh import finest_cell
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.program.quantities import counted
 from coupler.program.terminal import Row, duration, lines
+from coupler.run import cost
 from coupler.run.fast_openings import resolved_row
 from coupler.step.observe import joint_counts
 
 LONGEST_REST_STEP = 0.3
+FALL = "time.cfl at the speed of a free fall"
 NO_DAMAGE = 1e-12
 """Damage of joints that is round-off."""
 BYTES_PER_BLOCK = 60_000
@@ -43,17 +45,6 @@ CHECKPOINT_BYTES_PER_CELL = 36
 """Size of one checkpoint per cell, compressed; blocks take less than a tenth of it."""
 HISTORY_BYTES_PER_STEP = 4000
 """Rows of all histories without gauges."""
-SECONDS_PER_SUBSTEP, SECONDS_PER_POINT, SECONDS_PER_LOOSE_BLOCK = 1.2e-4, 1.7e-7, 3e-6
-"""Processor time of a substep, and more for each Gauss point of a joint and for each block without a joint, whose
-contacts must be found."""
-SECONDS_OF_A_START, SECONDS_OF_A_STRUCTURE = 1.0, 0.8
-SECONDS_PER_STEP, SECONDS_PER_WATER_STEP = 5e-3, 5e-3
-"""[s] Balances and histories of a step, and the part of a step of the water that does not depend on its size."""
-SECONDS_PER_CELL, SECONDS_PER_WET_BLOCK = 6e-7, 1.2e-3
-"""Of a step: for each cell of the mesh, and for each block that moves in water (cutting, carrying over, its rows of the
-pressure)."""
-SECONDS_PER_STATE_CELL, SECONDS_PER_STATE_BLOCK = 5e-7, 7e-4
-"""Of a written state. All read off ten of the cases, one thread of an AMD EPYC; see docs/speed.md."""
 
 
 @dataclass(frozen=True)
@@ -84,26 +75,28 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     disk = 0.0
     interval = Schedule.of(case).interval
     outputs = max(1, round(case.time.end / interval))
-    step = min(case.time.step_max, interval)
+    step, varies = min(case.time.step_max, interval), False
     if case.water:
-        step = _water_rows(case, interval, rows)
+        step, varies = _water_rows(case, interval, rows)
         cells, nodes = mesh_size(case.tank)
         disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
         if not case.structure:
             rows += _air_rows(case, None)
-    steps = math.ceil(case.time.end / step)
+    # a step ends at each written state, which a step that varies may do anyway
+    steps = math.ceil(case.time.end / step) if varies else outputs * math.ceil(interval / step * (1.0 - 1e-9))
     rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
-    seconds = SECONDS_OF_A_START + steps * SECONDS_PER_STEP
+    seconds = cost.SECONDS_OF_A_START + steps * cost.SECONDS_PER_STEP
     if case.water:
-        seconds += steps * (SECONDS_PER_WATER_STEP + SECONDS_PER_CELL * cells)
+        seconds += cost.SECONDS_OF_A_WATER + steps * cost.water_seconds(case, cells)
     if case.structure:
         blocks, moving, substeps = _structure_rows(case, rows, exact)
-        seconds += SECONDS_OF_A_STRUCTURE + substeps
-        seconds += SECONDS_PER_WET_BLOCK * moving * steps if case.water else 0.0
+        seconds += cost.SECONDS_OF_A_STRUCTURE + cost.passes(case) * substeps
+        if case.water and moving:
+            seconds += steps * cost.coupling_seconds(cells, moving)
         disk += DISK_BYTES_PER_BLOCK * blocks * (outputs + 1)
     disk += HISTORY_BYTES_PER_STEP * steps + _checkpoint_bytes(case)
     rows.append(Row("written states", outputs + 1, "", ""))
-    seconds += (outputs + 1) * (SECONDS_PER_STATE_CELL * cells + SECONDS_PER_STATE_BLOCK * blocks)
+    seconds += (outputs + 1) * cost.state_seconds(cells, blocks)
     rows += _time_rows(seconds)
     rows.append(Row("memory", memory(case, cells, blocks) / 1e6, "MB", "about"))
     rows.append(Row("disk", disk / 1e6, "MB", _disk_remark(disk, shutil.disk_usage(place).free)))
@@ -137,26 +130,26 @@ def _checkpoint_bytes(case: Case) -> float:
     return float(KEPT * CHECKPOINT_BYTES_PER_CELL * mesh_size(case.tank)[0])
 
 
-def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
-    """Add the rows of the water; return the step [s] that its largest speed allows."""
+def _water_rows(case: Case, interval: float, rows: list[Row]) -> tuple[float, bool]:
+    """Add the rows of the water; return the step [s] that its largest speed allows, and whether that speed sets it, so
+    that slower water takes longer ones."""
     cells, nodes = mesh_size(case.tank)
-    volume = sum(start_surfaces.volume(fill) for fill in case.water.fill)
-    if not case.tank.is_box:
-        volume = water_in(case.tank, case.water.fill)
+    volume = cost.volume_in(case.tank, case.water.fill)
     height = _highest(case) - case.tank.lower[2]
     g, h = case.case.gravity, finest_cell(case.tank)
-    fastest = math.sqrt(2.0 * g * height)
+    thrown = max((math.hypot(*fill.velocity) for fill in case.water.fill), default=0.0)
+    fastest = math.hypot(math.sqrt(2.0 * g * height), thrown)
     limits = {
         "time.step_max": case.time.step_max,
         "time.output_every": interval,
-        "time.cfl at the speed of a free fall": case.time.cfl * h / fastest if fastest > 0.0 else math.inf,
+        FALL: case.time.cfl * h / fastest if fastest > 0.0 else math.inf,
         "the cell size at rest": LONGEST_REST_STEP * math.sqrt(h / g) if g > 0.0 else math.inf,
     }
     reason = min(limits, key=limits.get)
     rows.append(Row("mesh", cells, "cells", f"{nodes} nodes, edge {h:.4g} m"))
     rows.append(Row("water", volume, "m3", "in the fill boxes, solids not taken off"))
     rows.append(Row("step", 1e3 * limits[reason], "ms", f"set by {reason}"))
-    return limits[reason]
+    return limits[reason], reason == FALL
 
 
 def _highest(case: Case) -> float:
@@ -171,14 +164,6 @@ def _highest(case: Case) -> float:
     return min(max(found), case.tank.upper[2])
 
 
-def structure_seconds(structure, substeps: int) -> float:
-    """Estimated processor time [s] of that many substeps while joints hold."""
-    points = 0 if structure.joints is None else len(structure.joints.weight)
-    loose = int(structure.loose().sum())
-    each = SECONDS_PER_SUBSTEP + SECONDS_PER_POINT * points + SECONDS_PER_LOOSE_BLOCK * loose
-    return substeps * each
-
-
 def _time_rows(seconds: float) -> Iterator[Row]:
     """Rows of processor time, and of wall time beside the programs that run now."""
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
@@ -187,7 +172,7 @@ def _time_rows(seconds: float) -> Iterator[Row]:
         "processor time",
         seconds,
         "s",
-        "about, to a factor of two; more where much breaks or fast water splashes",
+        "about, to a factor of 1.6; more where much breaks or fast water splashes",
     )
     wall = seconds / share
     beside = f"beside {counted(round(busy), 'other program')}" if busy >= 1.0 else "on this machine as it is"
@@ -225,7 +210,7 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int,
             _row_at_rest(structure, rows)
         if case.water:
             rows += _air_rows(case, structure)
-        seconds = structure_seconds(structure, math.ceil(case.time.end / substep))
+        seconds = cost.structure_seconds(structure, math.ceil(case.time.end / substep))
         return structure.n, int((~structure.fixed).sum()), seconds
     finally:
         structure.close()

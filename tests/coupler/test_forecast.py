@@ -6,6 +6,10 @@ import sys
 
 import pytest
 
+from coupler.checks.read_case import load
+from coupler.run import cost
+from coupler.run.forecast import forecast
+
 WATER = """
 [case]
 title = "t"
@@ -29,6 +33,15 @@ size = [0.2, 0.2, 0.2]
 centre = [0.7, 0.25, 0.1]
 [contact]
 stiffness = "1 MN/m"
+"""
+
+
+BORE = """
+[[water.inflow]]
+kind = "bore"
+side = "x-"
+ahead = 0.2
+level = 0.4
 """
 
 
@@ -58,3 +71,41 @@ def test_the_memory_that_is_forecast_is_what_a_run_takes(tmp_path, text):
     )
     assert run.returncode == 0, run.stderr
     assert forecast == pytest.approx(float(run.stdout), rel=0.25)
+
+
+def seconds_of(place, text):
+    (place / "case.toml").write_text(text, encoding="utf-8")
+    return forecast(load(place).case)["processor time"]
+
+
+def test_more_water_and_walls_that_rub_take_longer(tmp_path):
+    """A step is forecast from the water, not from the tank alone: a channel half full, with Manning's friction, took
+    three times what was said."""
+    text = WATER.replace("output_every = 0.025", "output_every = 0.05").replace("end = 0.05", "end = 5")
+    full = text.replace("upper = [0.4, 0.5, 0.3]", "upper = [1, 0.5, 0.3]")
+    rubbed = full.replace("[[water.fill]]", '[water]\nwalls = "friction"\nmanning = 0.02\n[[water.fill]]', 1)
+    plain, more, most = (seconds_of(tmp_path, scene) for scene in (text, full, rubbed))
+    assert plain < more < most
+
+
+def test_water_that_a_bore_brings_counts_by_half(tmp_path):
+    """It comes in over the run: half way between 0.2 m and 0.4 m, which is 0.6 of the tank."""
+    (tmp_path / "case.toml").write_text(
+        WATER.replace("upper = [0.4, 0.5, 0.3]", "upper = [1, 0.5, 0.2]") + BORE
+    )
+    case = load(tmp_path).case
+    assert cost.wet_cells(case, 1000) == pytest.approx(cost.SPREAD * 600.0)
+
+
+def test_stones_take_longer_than_boxes_as_they_have_more_nodes_and_faces(tmp_path):
+    boxes = BLOCK.replace("centre = [0.7, 0.25, 0.1]", "centre = [0.7, 0.25, 0.11]")
+    stones = boxes.replace("size = [0.2, 0.2, 0.2]", "diameter = 0.2")
+    dry = WATER[: WATER.index("[[water.fill]]")].replace("end = 0.05", "end = 1")
+    box, stone = (seconds_of(tmp_path, dry + text) for text in (boxes, stones))
+    assert stone > 1.2 * box
+
+
+def test_a_step_ends_at_each_written_state(tmp_path):
+    """Steps of 10 ms at most between states 25 ms apart are three each: six, and not five."""
+    (tmp_path / "case.toml").write_text(WATER, encoding="utf-8")
+    assert forecast(load(tmp_path).case)["steps"] == 6

@@ -110,7 +110,7 @@ def _counted(names: Iterable[str]) -> str:
 
 def _forecast(case: Case) -> Iterable[terminal.Row]:
     """Number of joints, the substep and the block that limits it, and the cost of a simulated second."""
-    from coupler.run.forecast import structure_seconds
+    from coupler.run.cost import structure_seconds
     from coupler.scene.build import build_structure
 
     structure = build_structure(case)
