@@ -93,8 +93,8 @@ def _swap(typingctx, address, value):
 
 
 @intrinsic
-def _taken(typingctx, address):
-    """Count up; → the number before."""
+def counted(typingctx, address):
+    """Count the number at an address up, whichever threads do so at once; → the number before."""
 
     def code(context, builder, signature, args):
         return builder.atomic_rmw("add", _pointer(builder, args[0]), ir.IntType(64)(1), "seq_cst")
@@ -193,7 +193,7 @@ def _work(plan, body, part, pack):
     parts = loaded(plan + 8 * Plan.parts)
     while part < parts:
         _call(body, part, pack)
-        part = _taken(plan + 8 * Plan.next)
+        part = counted(plan + 8 * Plan.next)
 
 
 @inner

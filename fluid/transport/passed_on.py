@@ -20,13 +20,16 @@ nodes of a thin sheet and of its surface have to, and Σ W u stays to round-off.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fluid.domain.topology import NO_WATER, Graph
 from fluid.numerics.fields import places_of
 from fluid.surface.shift import diffused_shift
 from fluid.surface.volume import Shift
-from kernels.decorators import kernel, ranged, released
+from kernels.decorators import inlined, ranged, released
+from kernels.team import counted
 from kernels.threads import over
 
 CONDUCTING, ANCHOR = 0.05, 0.02
@@ -35,6 +38,8 @@ that hold next to none take no part; and share of its edges that is added to the
 to all nodes of a region alike is not sought from far away."""
 TOLERANCE, MOST_ITERATIONS = 1e-2, 100
 """Where the conjugate gradients of (2) end."""
+SLOPES = 4
+"""Cost of looking at the edges of a node for those that the potential falls along, in usual rows."""
 
 
 def pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> None:
@@ -69,46 +74,136 @@ def _down(band, place, edges, height, spacing, capacity, held, u):
     """The volumes (1) of the potential `height` (n,) at the band (n,), handed on: held (N,) [m³] and u in place.
 
     place (N,): places of the nodes in the band, -1 elsewhere."""
-    order = np.argsort(-height, kind="stable")
-    _hand_on(order, band, place, edges, (height, spacing), capacity, held, np.zeros((len(band), 4)), u)
+    n, most = len(band), len(edges.stiffness)
+    numbers, volumes = np.empty((4, n), np.int64), np.empty((2, n))
+    slopes = Slopes(*numbers, *volumes, np.empty(most, np.uint32), np.empty(most), np.empty(most))
+    over(_find_slopes, n, band, place, edges, height, spacing, slopes, weight=SLOPES)
+    over(_hand_on, n, band, edges, slopes, capacity, held, u, weight=SLOPES)
 
 
-@kernel
-def _hand_on(order, band, place, edges, state, capacity, held, came, u):
-    """order (n,): places in the band by falling potential · state: potential (n,), size (N,) [m] of the cells · came
-    (n, 4), zero at first: momentum and volume that has come."""
-    (height, spacing), start, neighbour = state, edges.start, edges.neighbour
-    stiffness = edges.stiffness
-    for s in range(order.shape[0]):
-        p = order[s]
-        i = band[p]
-        left = held[i] + came[p, 3]
-        if left <= NO_WATER * capacity[i]:
-            held[i] = left
-            continue
-        for k in range(3):
-            u[i, k] = (held[i] * u[i, k] + came[p, k]) / left
-        begin, end, total = start[edges.row[i]], start[edges.row[i] + 1], 0.0
-        for t in range(begin, end):
-            j = neighbour[t]
+class Slopes(NamedTuple):
+    """Edges of a band (n,) that a potential falls along.
+
+    upper, lower (n,): end of those from above to a node, which begin where its edges do, and begin of those from it
+    down, which end where its edges do · waits (n,): minus the number of nodes above that have not handed on · next
+    (n,): work space · falls (n,) [m³]: Σ v_ij to the nodes below · share (n,): which share of these it hands on,
+    negative: nothing · other (edges,): place in the band of the other node, those above from the highest down, which
+    hand on in that order · fall, conducts (edges,): h_ij (ψ_i - ψ_j) and -K_ij from those above."""
+
+    upper: np.ndarray
+    lower: np.ndarray
+    waits: np.ndarray
+    next: np.ndarray
+    falls: np.ndarray
+    share: np.ndarray
+    other: np.ndarray
+    fall: np.ndarray
+    conducts: np.ndarray
+
+
+@ranged
+def _find_slopes(first, last, band, place, edges, height, spacing, slopes):
+    """Fill `slopes`, but for the shares."""
+    start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
+    other, fall, conducts = slopes.other, slopes.fall, slopes.conducts
+    for s in range(first, last):
+        p = np.uint64(s)
+        i = np.uint64(band[p])
+        row = np.uint64(edges.row[i])
+        begin, end = np.int64(start[row]), np.int64(start[row + np.uint64(1)])
+        own, size, total, upper, lower = height[p], spacing[i], 0.0, begin, end
+        for k in range(begin, end):
+            t = np.uint64(k)
+            conduct = -stiffness[t]
+            j = np.uint64(neighbour[t])
             q = place[j]
-            if q >= 0 and height[q] < height[p]:
-                down = 0.5 * (spacing[i] + spacing[j]) * (height[p] - height[q])
-                total += down * max(-stiffness[t], 0.0)
-        held[i] = left
-        if total <= 0.0:
+            if q < 0 or not conduct > 0.0:
+                continue
+            level = height[np.uint64(q)]
+            if level < own:
+                total += 0.5 * (size + spacing[j]) * (own - level) * conduct
+                lower -= 1
+                other[np.uint64(lower)] = q
+            elif level > own:
+                at = upper
+                while at > begin:
+                    to, before = np.uint64(at), np.uint64(at - 1)
+                    above = height[other[before]]
+                    if above > level or (above == level and other[before] < q):
+                        break
+                    other[to], fall[to], conducts[to] = other[before], fall[before], conducts[before]
+                    at -= 1
+                to = np.uint64(at)
+                other[to], conducts[to], fall[to] = q, conduct, 0.5 * (size + spacing[j]) * (level - own)
+                upper += 1
+        slopes.upper[p], slopes.lower[p], slopes.waits[p], slopes.falls[p] = (
+            upper,
+            lower,
+            begin - upper,
+            total,
+        )
+
+
+@ranged
+def _hand_on(first, last, band, edges, slopes, capacity, held, u):
+    """Hand on from the highest nodes of a range, and from each one below them, of any range, as soon as all above it
+    have: whoever is the last of those above hands on from there, too.
+
+    What comes to a node is added up from the highest to the lowest of those above, so that the sum does not depend on
+    which thread is ahead."""
+    start, row, waits, after = edges.start, edges.row, slopes.waits, slopes.next
+    place, whole = np.int64(waits.ctypes.data), first == 0 and last == band.shape[0]
+    for s in range(first, last):
+        if slopes.upper[s] > np.int64(start[row[band[s]]]):
             continue
+        top = s
+        after[s] = -1
+        while top >= 0:
+            p = np.uint64(top)
+            top = after[p]
+            _receive(p, band, edges, slopes, capacity, held, u)
+            for k in range(
+                slopes.lower[p], np.int64(start[np.uint64(row[np.uint64(band[p])]) + np.uint64(1)])
+            ):
+                q = slopes.other[np.uint64(k)]
+                if whole:
+                    before = waits[q]
+                    waits[q] = before + 1
+                else:
+                    before = counted(place + 8 * np.int64(q))
+                if before == -1:
+                    after[q] = top
+                    top = np.int64(q)
+
+
+@inlined
+def _receive(p, band, edges, slopes, capacity, held, u):
+    """What the nodes above hand on to the node at place p of the band, and what it hands on itself."""
+    i = np.uint64(band[p])
+    x, y, z, volume = 0.0, 0.0, 0.0, 0.0
+    for k in range(np.int64(edges.start[np.uint64(edges.row[i])]), slopes.upper[p]):
+        t = np.uint64(k)
+        q = np.uint64(slopes.other[t])
+        share = slopes.share[q]
+        if share >= 0.0:
+            moved = share * slopes.fall[t] * slopes.conducts[t]
+            j = np.uint64(band[q])
+            volume += moved
+            x += moved * u[j, 0]
+            y += moved * u[j, 1]
+            z += moved * u[j, 2]
+    left, before = held[i] + volume, held[i]
+    held[i], slopes.share[p] = left, -1.0
+    if left <= NO_WATER * capacity[i]:
+        return
+    u[i, 0] = (before * u[i, 0] + x) / left
+    u[i, 1] = (before * u[i, 1] + y) / left
+    u[i, 2] = (before * u[i, 2] + z) / left
+    total = slopes.falls[p]
+    if total > 0.0:
         share = min(1.0, left / total)
         held[i] = max(left - share * total, 0.0)
-        for t in range(begin, end):
-            j = neighbour[t]
-            q = place[j]
-            if q >= 0 and height[q] < height[p] and stiffness[t] < 0.0:
-                down = 0.5 * (spacing[i] + spacing[j]) * (height[p] - height[q])
-                moved = share * down * -stiffness[t]
-                came[q, 3] += moved
-                for k in range(3):
-                    came[q, k] += moved * u[i, k]
+        slopes.share[p] = share
 
 
 @released

@@ -8,6 +8,7 @@ from fluid.step.carried import carried_by_fluxes
 from fluid.surface.volume import Shift
 from fluid.transport.passed_on import _down, pass_on
 from fluid.transport.volume_transport import carry_volume
+from kernels import threads
 from tests.fluid.scenes import advance, column, tank
 
 
@@ -151,3 +152,54 @@ def test_a_node_that_holds_next_to_nothing_hands_on_all_that_comes_to_it():
         arrived.append(held[x > 1.05].sum() - below)
     assert arrived[0] > 1e-4
     assert arrived[1] == pytest.approx(arrived[0], rel=1e-3)
+
+
+def handed_on_one_by_one(band, edges, height, spacing, capacity, held, u):
+    """The nodes of the band in order of falling height, each of which gives its share to those below: W and u after."""
+    held, u, came = held.copy(), u.copy(), np.zeros((len(held), 4))
+    level = dict(zip(band, height))
+    for i in band[np.argsort(-height, kind="stable")]:
+        left = held[i] + came[i, 3]
+        before, held[i] = held[i], left
+        if left <= 1e-9 * capacity[i]:
+            continue
+        u[i] = (before * u[i] + came[i, :3]) / left
+        row = edges.row[i]
+        below = []
+        for s in range(edges.start[row], edges.start[row + 1]):
+            j = edges.neighbour[s]
+            if j in level and level[j] < level[i] and edges.stiffness[s] < 0.0:
+                below.append(
+                    (j, 0.5 * (spacing[i] + spacing[j]) * (level[i] - level[j]), -edges.stiffness[s])
+                )
+        total = sum(fall * conducts for _, fall, conducts in below)
+        if total > 0.0:
+            share = min(1.0, left / total)
+            held[i] = max(left - share * total, 0.0)
+            for j, fall, conducts in below:
+                moved = share * fall * conducts
+                came[j, 3] += moved
+                came[j, :3] += moved * u[i]
+    return held, u
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_nodes_hand_on_from_the_highest_down_on_any_number_of_threads(number):
+    """To the last bit what a list in order of falling height gives, with nodes of equal height and nodes that hold next
+    to nothing: the sum of what comes to a node has an order, whichever thread hands on from there."""
+    water = tank([2, 0.25, 0.5], 0.125, lambda x: x[:, 2] - 10.0)
+    t, draw = water.topology, np.random.default_rng(3)
+    band = np.flatnonzero(t.active)
+    edges, height = water.graph_for(band).edges, np.round(2.0 * draw.normal(size=len(band)))
+    held = t.node_volume * draw.choice([0.0, 1e-10, 0.01, 1.0], len(t.nodes))
+    u = draw.normal(size=(len(held), 3))
+    expected = handed_on_one_by_one(band, edges, height, t.node_size, t.node_volume, held, u)
+    threads.use(number, least=1)
+    try:
+        for _ in range(5):
+            found = held.copy(), u.copy()
+            _down(band, places_of(band, len(held)), edges, height, t.node_size, t.node_volume, *found)
+            np.testing.assert_array_equal(found[0], expected[0])
+            np.testing.assert_array_equal(found[1], expected[1])
+    finally:
+        threads.use(1)
