@@ -26,29 +26,51 @@ from kernels.threads import CHUNK, added_up, chunks_of, in_a_row, over
 
 DIVIDED = 0.3
 """Cost of a row of a vector that is divided by the diagonal, in usual rows."""
+IDLE = 1e-9
+"""Share of the mean of the diagonal up to which a row is idle."""
+NOBODY = np.zeros(0, np.int64)
 
 
-def diffused_shift(band, place, edges, c, residual, kappa, spacing, tolerance, most):
-    """ψ (n,) on the band nodes (n,) by conjugate gradients.
-
-    place (N,): their places in the band, -1 elsewhere · κ = kappa times the spacing (N,) [m] · at most `most`
-    iterations, until the residual has fallen by the tolerance."""
-    n, diagonal = len(band), c.copy()
-    first = np.zeros(n + 1, np.uint32)
-    over(_length_of_rows, n, band, place, edges, first[1:])
-    accumulate(first)
-    made = MadeRows(first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
-    over(_rows_of_shift, n, band, place, edges, kappa, spacing, made)
-    return _shift(first, made.column, made.entry, diagonal, residual, tolerance, most)
-
-
-class MadeRows(NamedTuple):
-    """The matrix c + κ K that is filled: first (n + 1,) entry of each row, column, entry, diagonal (n,)."""
+class ShiftRows(NamedTuple):
+    """The matrix c + κ K: first (n + 1,) entry of each row, column, entry, diagonal (n,), and idle (k,): rows in which
+    there is nothing to shift and nobody to pass it to."""
 
     first: np.ndarray
     column: np.ndarray
     entry: np.ndarray
     diagonal: np.ndarray
+    idle: np.ndarray
+
+    def shift(self, residual, tolerance, most):
+        """ψ (n,) for the right hand side (n,), by at most `most` iterations, until the residual has fallen by the
+        tolerance."""
+        n, r = len(residual), residual.copy()
+        r[self.idle] = 0.0
+        (z, p, Ap), x = np.empty((3, n)), np.zeros(n)
+        over(_first_way, n, self.diagonal, r, z, p, weight=DIVIDED)
+        vectors = (x, r, z, p, Ap, np.empty(chunks_of(n)))
+        in_a_row(_iterated, self[:4], vectors, _dot(r, z), tolerance, most)
+        return x
+
+
+def rows_of_shift(band, place, edges, c, kappa, spacing) -> ShiftRows:
+    """The matrix on the band nodes (n,).
+
+    place (N,): their places in the band, -1 elsewhere · κ = kappa times the spacing (N,) [m]."""
+    n, diagonal = len(band), np.empty(len(band))
+    first = np.zeros(n + 1, np.uint32)
+    over(_length_of_rows, n, band, place, edges, first[1:])
+    accumulate(first)
+    rows = (first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
+    ends = over(_rows_of_shift, n, band, place, edges, c, kappa, spacing, rows)
+    idle = NOBODY
+    if min(least for least, _ in ends) <= 2.0 * IDLE * max(
+        largest for _, largest in ends
+    ):  # otherwise there is none
+        typical = _mean(diagonal)
+        idle = np.flatnonzero(diagonal <= IDLE * typical)
+        diagonal[idle] = typical
+    return ShiftRows(*rows, idle)
 
 
 @ranged
@@ -63,29 +85,24 @@ def _length_of_rows(begin, end, band, place, edges, found):
 
 
 @ranged
-def _rows_of_shift(begin, end, band, place, edges, kappa, spacing, made):
-    """κ K of the edges within the band that conduct, and c - Σ κ K on the diagonal, in place."""
+def _rows_of_shift(begin, end, band, place, edges, c, kappa, spacing, made):
+    """κ K of the edges within the band that conduct, and c - Σ κ K on the diagonal; → its least and largest value."""
     graph_row, start, neighbour, stiffness = edges
     first, column, entry, diagonal = made
+    least, largest = np.inf, 0.0
     for r in range(begin, end):
-        row, k = graph_row[band[r]], first[r]
+        row, k, total = graph_row[band[r]], first[r], c[r]
         for s in range(start[row], start[row + 1]):
             q = place[neighbour[s]]
             if q >= 0 and stiffness[s] < 0.0:
                 column[k] = q
                 both = kappa * spacing[band[r]] + kappa * spacing[neighbour[s]]
                 entry[k] = 0.5 * both * stiffness[s]
-                diagonal[r] -= entry[k]
+                total -= entry[k]
                 k += 1
-
-
-def _shift(first, column, entry, diagonal, residual, tolerance, most):
-    """x (n,) of the rows first[r]:first[r + 1] of (column, entry) with their diagonal, which is overwritten."""
-    n = len(diagonal)
-    x, r, z, Ap = np.zeros(n), residual.copy(), np.empty(n), np.empty(n)
-    rz, sums = _first_way(diagonal, r, z), np.empty(chunks_of(n))
-    in_a_row(_iterated, (first, column, entry, diagonal), (x, r, z, z.copy(), Ap, sums), rz, tolerance, most)
-    return x
+        diagonal[r] = total
+        least, largest = min(least, total), max(largest, total)
+    return least, largest
 
 
 @nogil
@@ -113,15 +130,23 @@ def _iterated(crew, matrix, vectors, rz, tolerance, most):
         rz = new
 
 
-@kernel
-def _first_way(diagonal, r, z):
-    """z = r/diagonal in place → r·z."""
-    typical = diagonal.mean() if len(diagonal) > 0 else 1.0
-    for i in range(len(diagonal)):
-        if diagonal[i] <= 1e-9 * typical:  # nothing to shift there and nobody to pass it to
-            diagonal[i], r[i] = typical, 0.0
+@ranged
+def _first_way(begin, end, diagonal, r, z, p):
+    """z = r/diagonal, and the first direction p."""
+    for k in range(begin, end):
+        i = np.uint64(k)
         z[i] = r[i] / diagonal[i]
+        p[i] = z[i]
+
+
+@kernel
+def _dot(r, z):
     return np.dot(r, z)
+
+
+@kernel
+def _mean(diagonal):
+    return diagonal.mean()
 
 
 @ranged

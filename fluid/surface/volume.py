@@ -42,7 +42,7 @@ from fluid.numerics.fields import added, copied, marks_of, places_of
 from fluid.numerics.sums import total
 from fluid.surface.last_shift import LAST_SHIFTS, lower, met_total
 from fluid.surface.level_set import drain_films
-from fluid.surface.shift import diffused_shift
+from fluid.surface.shift import rows_of_shift
 from kernels.decorators import ranged, released
 from kernels.threads import found_over, over, owning, owns_any, reach_of_cells
 
@@ -50,6 +50,8 @@ BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
 ANCHOR = 1e-3
 VOLUME_TOLERANCE = 1e-6
+SOLVED = (1e-2, 40)
+"""By how much the residual of (2) falls, within how many iterations."""
 AHEAD, SAME_STEP = 2.0, 1e-9
 """Most steps like the last one for which its change of the velocity goes on in one; difference of two steps over their
 length that counts as round-off."""
@@ -174,9 +176,12 @@ def edge_rates(topology, graph, listed, u_cell):
 
 @dataclass(frozen=True)
 class Shift:
-    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with κ = kappa times the spacing (N,) [m]."""
+    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with κ = kappa times the spacing (N,) [m].
+
+    place (N,): places of nodes in the band, -1 elsewhere."""
 
     band: Ints
+    place: Ints
     value: Floats
     kappa: float
     spacing: Floats
@@ -210,7 +215,8 @@ def correct_volume(
     place = places_of(band, n)
     c, residual = np.empty(len(band)), np.empty(len(band))
     over(_equation, len(band), band, slope, topology.node_volume, spacing, (carried, own), c, residual)
-    shift = diffused_shift(band, place, graph.edges, c, residual, kappa, spacing, 1e-2, 40)
+    rows = rows_of_shift(band, place, graph.edges, c, kappa, spacing)
+    shift = rows.shift(residual, *SOLVED)
     moved = copied(phi)
     over(lower, len(band), band, phi, shift, LARGEST_SHIFT, spacing, moved)
     if again > 0.0:
@@ -219,7 +225,7 @@ def correct_volume(
             _equation, len(band), band, slope, topology.node_volume, spacing, (carried, at_first), c, residual
         )
         residual *= again
-        shift = shift + diffused_shift(band, place, graph.edges, c, residual, kappa, spacing, 1e-2, 40)
+        shift = shift + rows.shift(residual, *SOLVED)
         over(lower, len(band), band, phi, shift, LARGEST_SHIFT, spacing, moved)
     tolerance = VOLUME_TOLERANCE * abs(target)
     for most in LAST_SHIFTS:
@@ -238,7 +244,7 @@ def correct_volume(
         nodal_water=added(inner, of_near),
         uncorrected_water=own,
         reinserted=reinserted,
-        shift=Shift(band, shift, kappa, spacing),
+        shift=Shift(band, place, shift, kappa, spacing),
     )
 
 

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fluid.domain.topology import NO_WATER, Graph
-from fluid.numerics.fields import places_of
-from fluid.surface.shift import diffused_shift
+from fluid.numerics.fields import PLAIN
+from fluid.surface.shift import rows_of_shift
 from fluid.surface.volume import Shift
 from kernels.decorators import inlined, ranged, released
 from kernels.team import counted
@@ -48,9 +48,14 @@ def pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> No
     gained (N,) [m³]: what the nodes hold in the end, what the fluxes brought, and what the surface swept beyond it, so
     that they gain the first less the second and more the third · share (N,) of its rest that is passed on · water,
     capacity (N,) [m³]: what the nodes hold before, and could hold."""
-    n, edges, spacing, band = len(water), graph.edges, shift.spacing, shift.band
-    held, place = np.empty(n), places_of(band, n)
-    over(_at_least_none, n, water, held)
+    edges, spacing, band, place, held = (
+        graph.edges,
+        shift.spacing,
+        shift.band,
+        shift.place,
+        np.empty(len(water)),
+    )
+    over(_at_least_none, len(water), water, held, weight=PLAIN)
     _down(band, place, edges, shift.kappa * shift.value, spacing, capacity, held, u)
     sought = np.empty(len(band))
     if not sum(over(_sought, len(band), band, gained, share, (water, held), sought)):
@@ -58,7 +63,8 @@ def pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> No
     stiffness, anchor = np.empty(len(edges.stiffness)), np.empty(len(band))
     over(_through_water, len(band), band, edges, spacing, (held, gained[0], capacity), (stiffness, anchor))
     edges = edges._replace(stiffness=stiffness)
-    height = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
+    rows = rows_of_shift(band, place, edges, anchor, 1.0, spacing)
+    height = rows.shift(sought, TOLERANCE, MOST_ITERATIONS)
     _down(band, place, edges, height, spacing, capacity, held, u)
 
 

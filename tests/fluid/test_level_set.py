@@ -12,7 +12,7 @@ from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.surface.closest_triangles import squared_distance
 from fluid.surface.level_set import FAR, no_steeper, redistance
-from fluid.surface.shift import _shift
+from fluid.surface.shift import NOBODY, ShiftRows
 from fluid.surface.volume import nodal_volume
 from kernels.decorators import plain
 
@@ -191,7 +191,9 @@ def test_the_correction_of_the_volume_does_not_jump_with_the_number_of_its_steps
 
     def solved(tolerance):
         diagonal = 0.3 + np.diff(first).astype(float)
-        return _shift(first, column, np.full(len(column), -1.0), diagonal, residual.copy(), tolerance, 100)
+        return ShiftRows(first, column, np.full(len(column), -1.0), diagonal, NOBODY).shift(
+            residual, tolerance, 100
+        )
 
     found = np.array([solved(tolerance) for tolerance in 10.0 ** np.arange(-1.0, -3.0, -0.001)])
     jump = np.abs(np.diff(found, axis=0)).max() / np.abs(found[-1]).max()

@@ -119,7 +119,7 @@ def test_what_the_correction_moves_takes_its_momentum_along_even_past_a_node_wit
     room = t.node_volume.copy()
     room[band[len(band) // 2]] = 0.0
     before = found.water @ u
-    nothing = Shift(band, np.zeros(len(band)), 5.0, t.node_size)
+    nothing = Shift(band, places_of(band, len(u)), np.zeros(len(band)), 5.0, t.node_size)
     graph, everywhere = water.graph_for(water.listed), np.ones(len(u))
     gains = (gained, np.zeros(len(u)), np.zeros(len(u)))
     pass_on(graph, nothing, gains, everywhere, found.water, room, u)
