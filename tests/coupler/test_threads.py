@@ -359,3 +359,38 @@ def test_the_benchmark_counts_what_threads_share_and_what_kernels_move(monkeypat
     moved = measured._bytes("_fast", (0, 50, bundle, out), 200, 1000, ("nodes", "shape"))
     assert moved == bundle.nodes.nbytes / 4 + out.nbytes
     assert measured._bytes("_fast", (0, 50, (bundle, out)), 200, 1000) > moved + bundle.cells.nbytes / 5
+
+
+@ranged
+def _one(first, last, out):
+    for i in range(first, last):
+        out[i] = 1.0
+
+
+@ranged
+def _two(first, last, out):
+    for i in range(first, last):
+        out[i] = 2.0
+
+
+def test_the_benchmark_names_what_lies_between_shared_loops(monkeypatch):
+    """Two loops with ten milliseconds of Python between them, and none after: that piece is the largest, what it takes
+    to watch the loops does not count, and pieces between the same loops are of one kind."""
+    monkeypatch.setattr(measured, "STEPS", 1)
+
+    def work():
+        for pause in (0.01, 0.0):
+            kernels.over(_one, 5000, np.zeros(5000))
+            until = time.process_time() + pause
+            while time.process_time() < until:
+                pass
+            kernels.over(_two, 5000, np.zeros(5000))
+
+    shared, pieces = measured.least_times(work)
+    names = [(piece.after, piece.before) for piece in pieces]
+    assert names == [(None, "_one"), ("_one", "_two"), ("_two", "_one"), ("_one", "_two"), ("_two", None)]
+    assert shared > 0.0
+    assert pieces[1].seconds > 0.009
+    told = measured.largest(pieces)
+    assert told[0][:3] == ("_one", "_two", 2.0)
+    assert told[0][3] == pytest.approx(sum(piece.seconds for piece in (pieces[1], pieces[3])))

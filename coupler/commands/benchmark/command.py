@@ -259,6 +259,9 @@ def _threads(sizes):
         goal = MOST_SERIAL if nodes == THREADS_NODES[-1] else None
         yield Line("  serial share of one thread's processor time", n, 0, found["serial"], "of all", goal)
         yield Line("  the same as time", n, 0, 1e6 * found["outside"], "a step")
+        for after, before, count, seconds in found["pieces"]:
+            what = f"  {count:.3g} times between {_named(after)} and {_named(before)}"
+            yield Line(what, n, 0, 1e6 * seconds, "a step")
         for cores in threads.MORE:
             yield Line(
                 f"  {cores} cores by Amdahl's law",
@@ -267,6 +270,10 @@ def _threads(sizes):
                 threads.amdahl(found["serial"], cores),
                 "times as fast",
             )
+
+
+def _named(kernel: str | None) -> str:
+    return "start or end" if kernel is None else kernel.strip("_")
 
 
 def _machine(found):

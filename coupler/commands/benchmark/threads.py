@@ -3,8 +3,8 @@
 
 Speed-ups are ratios of wall times, the least of REPEATS with the numbers of threads in turn, all from one state.
 The serial share is the part of the processor time of one thread that is spent outside of the threaded kernels, each of
-them and each piece between two of them by the least of REPEATS; Amdahl's law gives the speed-up with more cores from
-it. Bytes are the least that a kernel must read and write, each once, of
+them and each piece between two of them by the least of REPEATS, less what it takes to watch them; Amdahl's law gives
+the speed-up with more cores from it. Bytes are the least that a kernel must read and write, each once, of
 the parts of the arrays that it uses; bandwidth is that of a triad a = b + s c in the same process.
 """
 
@@ -13,6 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from coupler.commands.benchmark.water import BEFORE, dam_break, step
 from coupler.program.threads import cores
 
 REPEATS, STEPS = 5, 3
+WATCHED, MOST_TOLD = 500, 12
+"""How often an empty kernel is watched, to know what that takes; number of kinds of pieces that are told."""
 MORE = (8, 16, 64)
 TRIAD = 8_000_000
 """Numbers in each array of the triad: far more than caches hold."""
@@ -70,7 +73,8 @@ def threads(nodes: int) -> dict:
             _steps(scene, start)
             wall[n] = min(wall[n], (time.perf_counter() - began) / STEPS)
     use(1)
-    shared, outside = least_times(lambda: _steps(scene, start))
+    shared, pieces = least_times(lambda: _steps(scene, start))
+    outside = sum(piece.seconds for piece in pieces)
     return {
         "nodes": len(scene.mesh.nodes),
         "cells": len(scene.mesh.cells),
@@ -78,13 +82,23 @@ def threads(nodes: int) -> dict:
         "step": (shared + outside) / STEPS,
         "outside": outside / STEPS,
         "serial": outside / (shared + outside),
+        "pieces": largest(pieces),
         "machine": machine(numbers()),
     }
 
 
-def least_times(work: Callable[[], None]) -> tuple[float, float]:
-    """Processor seconds of work() on one thread in and outside of the threaded kernels: the least of REPEATS for each
-    of them and for each piece between two of them, added up. Other programs lengthen now one piece, now another.
+class Piece(NamedTuple):
+    """What lies between two threaded kernels: their names, None at either end of a measurement, and its processor
+    seconds."""
+
+    after: str | None
+    before: str | None
+    seconds: float
+
+
+def least_times(work: Callable[[], None]) -> tuple[float, list[Piece]]:
+    """Processor seconds of work() on one thread in the threaded kernels, and what lies between two of them: the least
+    of REPEATS for each of them and each piece. Other programs lengthen now one piece, now another.
 
     Repeats that call fewer or more kernels than the last one, which fill what is kept, do not count."""
     from kernels.threads import watched
@@ -98,8 +112,45 @@ def least_times(work: Callable[[], None]) -> tuple[float, float]:
         begin, spent = (np.array([getattr(call, name) for call in calls]) for name in ("began", "seconds"))
         found.append((spent, np.append(begin, last) - np.append(first, begin + spent)))
     alike = [pair for pair in found if len(pair[0]) == len(found[-1][0])]
-    shared, outside = (np.min(times, axis=0).sum() for times in zip(*alike))
-    return float(shared), float(outside)
+    shared, outside = (np.min(times, axis=0) for times in zip(*alike))
+    of_python, of_driver = watching()
+    of_each = np.array([of_python if call.rows else of_driver for call in calls])
+    outside[:-1] = np.maximum(outside[:-1] - of_each, 0.0)
+    names = [None, *(call.name for call in calls), None]
+    return float(shared.sum()), [Piece(*piece) for piece in zip(names, names[1:], outside.tolist())]
+
+
+def watching() -> tuple[float, float]:
+    """Processor seconds that it takes to watch a kernel beyond those that count as its own: one that Python calls, and
+    one that a driver does (`kernels/in_a_row.py`), for which it is the time to read the clock."""
+    from coupler.commands.benchmark.machine import _empty
+    from kernels.threads import over, watched
+
+    out, usual, seen, read = np.zeros(1), np.inf, np.inf, np.inf
+    for _ in range(WATCHED):
+        begun = time.process_time()
+        read = min(read, time.process_time() - begun)
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        for _ in range(WATCHED):
+            over(_empty, 1, out, weight=1e9)
+        usual = min(usual, time.process_time() - begun)
+        with watched():
+            begun = time.process_time()
+            for _ in range(WATCHED):
+                over(_empty, 1, out, weight=1e9)
+            seen = min(seen, time.process_time() - begun)
+    return max((seen - usual) / WATCHED - read, read), read
+
+
+def largest(pieces: list[Piece]) -> list[tuple[str | None, str | None, float, float]]:
+    """The names, number in a step and seconds of a step of those kinds of pieces that take longest, MOST_TOLD of them;
+    pieces between the same two kernels are of one kind."""
+    kinds: dict[tuple[str | None, str | None], list[float]] = {}
+    for piece in pieces:
+        kinds.setdefault((piece.after, piece.before), []).append(piece.seconds)
+    longest = sorted(kinds.items(), key=lambda kind: -sum(kind[1]))[:MOST_TOLD]
+    return [(*names, len(times) / STEPS, sum(times) / STEPS) for names, times in longest]
 
 
 def _steps(scene, start) -> None:
