@@ -156,8 +156,8 @@ def _steps(
     )
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
-    long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints, recorder)
-    calm, fall, verdict = Calm(), Fall(), recorder.verdict
+    long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
+    calm, fall = Calm(), Fall()
     try:
         if checkpoint is None:
             with clock("output"):
@@ -193,15 +193,18 @@ def _steps(
             if reason:
                 raise _end(reporter)(reason + way_on)
     except StepLeft as left:
-        before, found = long.held
-        verdict = lambda: found  # noqa: E731 - that of the last complete step
+        before, structure = long.held
+        if structure is not None:  # the verdict is that of the last complete step
+            coupling.structure.restore(structure)
         if checkpoints is not None:
             with clock("output"):
                 checkpoints.put(before)
         raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
-        _report_verdict(case, verdict(), figures, schedule.end, directory, reporter, coupling.coupled)
+        _report_verdict(
+            case, recorder.verdict(), figures, schedule.end, directory, reporter, coupling.coupled
+        )
 
 
 def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
@@ -251,15 +254,13 @@ def _report_verdict(
         reporter.message(f"but: {line}")
 
 
-def _long_steps(
-    coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints, recorder: Recorder
-) -> LongSteps:
+def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:
     """The object that both solvers call within a long step, to abandon it where the run is to end. It holds the state
-    before the step, None without checkpoints, and the verdict then."""
+    before the step, None without checkpoints, and that of the structure for the verdict, None without one."""
 
     def hold():
         state = None if checkpoints is None else checkpoints.hold(figures, clock.split())
-        return state, recorder.verdict()
+        return state, None if coupling.structure is None else coupling.structure.save()
 
     long = LongSteps(lambda: _stop_reason(clock, limits, reporter), hold)
     coupling.pause = long

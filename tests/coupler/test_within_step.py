@@ -5,10 +5,14 @@ import pytest
 from coupler.commands.warm_up import Silent
 from coupler.run import within_step
 from coupler.run.checkpoint import FOLDER, listed
+from coupler.run.summary import read_summary
 from coupler.run.within_step import LongSteps, StepLeft
 from coupler.step.limits import LimitReached
 from tests.coupler.resumed import DRY, begin, check_same, go_on
 from tests.coupler.test_resume import COUPLED, STREAM
+
+BREAKS = 12
+"""Steps of DRY before the one in which its first joint breaks."""
 
 
 @pytest.fixture
@@ -46,6 +50,16 @@ def left_and_gone_on(tmp_path, text, whole, steps, asks):
 
 def test_a_dry_step_is_left_between_substeps(dry, tmp_path, impatient):
     left_and_gone_on(tmp_path, DRY, dry, steps=5, asks=3)
+
+
+def test_the_verdict_of_a_step_that_was_left_is_that_of_the_last_complete_one(tmp_path, impatient):
+    """Blocks that were under way have gone back: the run says what it would say had it ended before the step."""
+    found = []
+    for name, asks in (("left", 60), ("ended", 0)):
+        with pytest.raises(LimitReached):
+            begin(tmp_path / "case", DRY, tmp_path / name, reporter=StopWithin(BREAKS, asks))
+        found.append(read_summary(tmp_path / name)["figures"]["verdict"])
+    assert found[0] == found[1]
 
 
 def test_a_coupled_step_is_left_between_passes_and_substeps(tmp_path, impatient):
