@@ -32,6 +32,7 @@ from fluid.cut.pieces import (
     Workspace,
     classify,
     copy_piece,
+    lies_outside,
     merge_moments,
     piece_moments,
     split,
@@ -159,11 +160,12 @@ def _subtract(w, piece, at, round_off, thin, top, n_vertices):
 
     Fragments are left on top of the stack -> (state, whole, new top, number of vertices)."""
     start, end = w.near_start[at], w.near_start[at + 1]
-    low, high = 0.0, 0.0
-    for r in range(end - 1, start - 1, -1):  # the first plane last: its distances are needed next
-        low, high = classify(w, piece, w.near_distance[r], round_off)
-        if low == 0.0:
+    for r in range(end - 1, start, -1):
+        if lies_outside(w, piece, w.near_distance[r], round_off):
             return DONE, True, top, n_vertices
+    low, high = classify(w, piece, w.near_distance[start], round_off)
+    if low == 0.0:
+        return DONE, True, top, n_vertices
     # Fragments stack up from `top`; what is still inside alternates between the last two slots.
     current, fresh, spare = piece, top, len(w.faces) - 1
     for r in range(start, end):

@@ -7,7 +7,7 @@ thousandth of a cell thick and as long as the row, out of which moving bodies pr
 
 from __future__ import annotations
 
-from fluid.cut.polygons import load_face, shared_area
+from fluid.cut.polygons import PLACE, load_face, shared_area
 from kernels.decorators import inner
 
 BEFORE = 0.5
@@ -44,8 +44,8 @@ def _linked(w, one, two, normals, round_off, enough, least):
         for k in range(w.faces[two]):
             if w.tag[two, k] == (tag ^ 1):
                 g = tag // 2
-                load_face(w, one, f, 0)
-                load_face(w, two, k, 1)
+                load_face(w, one, f, 0, PLACE)
+                load_face(w, two, k, 1, PLACE)
                 shared = shared_area(w, 0, 1, normals[g, 0], normals[g, 1], normals[g, 2], round_off)
                 if shared > least and (_in_front(w, one, f, normals) or _in_front(w, two, k, normals)):
                     return True

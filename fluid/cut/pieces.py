@@ -121,6 +121,17 @@ def classify(w, piece, d, round_off):
     return low, high
 
 
+@inlined
+def lies_outside(w, piece, d, round_off):
+    """Whether no vertex of a piece is inside the plane with the distances d (4,) at the nodes: whether `classify` would
+    find 0 as the lowest."""
+    for f in range(w.faces[piece]):
+        for k in range(w.size[piece, f]):
+            if interpolated(w.x[w.loop[piece, f, k]], d) < -round_off:
+                return False
+    return True
+
+
 @inner
 def _edge_vertex(w, a, b, first_new, n_vertices):
     """The vertex where edge ab crosses the plane: made once, shared by the two faces at the edge."""

@@ -9,33 +9,36 @@ import numpy as np
 
 from kernels.decorators import inlined, inner
 
+PLACE = 4
+"""The first number of a corner that belongs to its position: where only that is asked for, the rest is not copied."""
 # Corners of the equilateral triangle with unit second moment about its centre.
 SQRT2 = np.sqrt(2.0)
 TRIANGLE = np.array([[SQRT2, 0.0], [-SQRT2 / 2, np.sqrt(1.5)], [-SQRT2 / 2, -np.sqrt(1.5)]])
 
 
 @inner
-def load_face(w, piece, f, polygon):
-    """Copy a face of a piece to a polygon slot."""
+def load_face(w, piece, f, polygon, column):
+    """Copy a face of a piece to a polygon slot, from a `column` of its corners on."""
     for k in range(w.size[piece, f]):
         v = w.loop[piece, f, k]
-        for c in range(7):
+        for c in range(column, 7):
             w.polygon[polygon, k, c] = w.x[v, c]
     w.corners[polygon] = w.size[piece, f]
 
 
 @inner
-def copy_polygon(w, source, target):
-    """Copy slot `source` to slot `target`."""
+def copy_polygon(w, source, target, column):
+    """Copy slot `source` to slot `target`, from a `column` of the corners on."""
     w.corners[target] = w.corners[source]
     for k in range(w.corners[source]):
-        for c in range(7):
+        for c in range(column, 7):
             w.polygon[target, k, c] = w.polygon[source, k, c]
 
 
 @inner
-def split_polygon(w, polygon, outer, inner, round_off):
-    """Split a convex polygon by the plane whose distances are in w.height -> (outside, inside) not empty.
+def split_polygon(w, polygon, outer, inner, round_off, column):
+    """Split a convex polygon by the plane whose distances are in w.height -> (outside, inside) not empty. The halves
+    get the corners from a `column` on.
 
     Where one side is empty nothing is written. A polygon within the plane counts as inside."""
     corners = w.corners[polygon]
@@ -53,18 +56,18 @@ def split_polygon(w, polygon, outer, inner, round_off):
     for b in range(corners):
         if w.height[a] * w.height[b] < 0.0:
             t = w.height[a] / (w.height[a] - w.height[b])
-            for c in range(7):
+            for c in range(column, 7):
                 x = w.polygon[polygon, a, c] + t * (w.polygon[polygon, b, c] - w.polygon[polygon, a, c])
                 w.polygon[outer, n_out, c] = x
                 w.polygon[inner, n_in, c] = x
             n_out += 1
             n_in += 1
         if w.height[b] >= 0.0:
-            for c in range(7):
+            for c in range(column, 7):
                 w.polygon[outer, n_out, c] = w.polygon[polygon, b, c]
             n_out += 1
         if w.height[b] <= 0.0:
-            for c in range(7):
+            for c in range(column, 7):
                 w.polygon[inner, n_in, c] = w.polygon[polygon, b, c]
             n_in += 1
         a = b
@@ -116,7 +119,7 @@ def _turn(w, polygon, nx, ny, nz):
 
 
 @inner
-def split_by_edge(w, polygon, face, k, normal, outer, inner, round_off):
+def split_by_edge(w, polygon, face, k, normal, outer, inner, round_off, column):
     """Split a convex polygon by edge k of a coplanar one in slot `face`, as `split_polygon` does; normal: (3,) that
     `sense` gave. Edges no longer than round-off split nothing."""
     a, b = w.polygon[face, k], w.polygon[face, (k + 1) % w.corners[face]]
@@ -129,7 +132,7 @@ def split_by_edge(w, polygon, face, k, normal, outer, inner, round_off):
     for j in range(w.corners[polygon]):
         p = w.polygon[polygon, j]
         w.height[j] = (mx * (p[4] - a[4]) + my * (p[5] - a[5]) + mz * (p[6] - a[6])) / length
-    return split_polygon(w, polygon, outer, inner, round_off)
+    return split_polygon(w, polygon, outer, inner, round_off, column)
 
 
 @inner
@@ -146,22 +149,18 @@ def shared_area(w, one, two, nx, ny, nz, round_off):
     normal = sense(w, two, nx, ny, nz)
     spare = max(one, two) + 1
     for k in range(w.corners[two]):
-        outside, inside = split_by_edge(w, one, two, k, normal, spare, spare + 1, round_off)
+        outside, inside = split_by_edge(w, one, two, k, normal, spare, spare + 1, round_off, PLACE)
         if not inside:
             return 0.0
         if outside:
-            copy_polygon(w, spare + 1, one)
+            copy_polygon(w, spare + 1, one, PLACE)
     return polygon_area(w, one)
 
 
-@inlined
-def polygon_rule(w, polygon, nx, ny, nz, least, row):
-    """row (16,) <- area, centroid, normal and three points, weight area / 3, exact to degree 2.
-
-    Points c + R s_q, R the symmetric root of the in-plane covariance, s_q the corners of an equilateral
-    triangle with unit covariance. row[0] = 0 for an area of at most `least` [m2]."""
-    x0, y0, z0 = w.polygon[polygon, 0, 4], w.polygon[polygon, 0, 5], w.polygon[polygon, 0, 6]
-    # Any two directions in the plane: the rule depends on them only by a rotation of the points.
+@inner
+def across(nx, ny, nz):
+    """Two unit vectors t, r = n × t in the plane with unit normal n, as six numbers. Any two would do: a rule depends
+    on them only by a rotation of its points."""
     if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
         tx, ty, tz = 0.0, nz, -ny
     elif abs(ny) <= abs(nz):
@@ -170,43 +169,47 @@ def polygon_rule(w, polygon, nx, ny, nz, least, row):
         tx, ty, tz = ny, -nx, 0.0
     length = np.sqrt(tx * tx + ty * ty + tz * tz)
     tx, ty, tz = tx / length, ty / length, tz / length
-    rx, ry, rz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-    area, fs, ft, ss, tt, st = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    a_s, a_t = 0.0, 0.0
-    for k in range(1, w.corners[polygon]):
-        dx, dy, dz = (
-            w.polygon[polygon, k, 4] - x0,
-            w.polygon[polygon, k, 5] - y0,
-            w.polygon[polygon, k, 6] - z0,
-        )
-        b_s = dx * tx + dy * ty + dz * tz
-        b_t = dx * rx + dy * ry + dz * rz
-        if k > 1:
-            half = (a_s * b_t - a_t * b_s) / 2.0
-            s, t = a_s + b_s, a_t + b_t
-            area += half
-            fs += half * s / 3.0
-            ft += half * t / 3.0
-            ss += half * (a_s * a_s + b_s * b_s + s * s) / 12.0
-            tt += half * (a_t * a_t + b_t * b_t + t * t) / 12.0
-            st += half * (a_s * a_t + b_s * b_t + s * t) / 12.0
-        a_s, a_t = b_s, b_t
+    return tx, ty, tz, ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+
+
+@inlined
+def triangle_rule(corners, first, second, n, plane, least, row):
+    """row (16,) <- area, centroid, normal and three points, weight area / 3, exact to degree 2, of the triangle of
+    corners 0, `first` and `second` of a polygon (corners, 7) with unit normal n; plane: `across` of it.
+
+    Points c + R s_q, R the symmetric root of the in-plane covariance, s_q the corners of an equilateral
+    triangle with unit covariance. row[0] = 0 for an area of at most `least` [m2]."""
+    tx, ty, tz, rx, ry, rz = plane
+    x0, y0, z0 = corners[0, 4], corners[0, 5], corners[0, 6]
+    dx, dy, dz = corners[first, 4] - x0, corners[first, 5] - y0, corners[first, 6] - z0
+    a_s = dx * tx + dy * ty + dz * tz
+    a_t = dx * rx + dy * ry + dz * rz
+    dx, dy, dz = corners[second, 4] - x0, corners[second, 5] - y0, corners[second, 6] - z0
+    b_s = dx * tx + dy * ty + dz * tz
+    b_t = dx * rx + dy * ry + dz * rz
+    area = (a_s * b_t - a_t * b_s) / 2.0
     if abs(area) <= least:
         row[0] = 0.0
         return
+    s, t = a_s + b_s, a_t + b_t
+    fs, ft = area * s / 3.0, area * t / 3.0
+    ss = area * (a_s * a_s + b_s * b_s + s * s) / 12.0
+    tt = area * (a_t * a_t + b_t * b_t + t * t) / 12.0
+    st = area * (a_s * a_t + b_s * b_t + s * t) / 12.0
     fs, ft = fs / area, ft / area
     ss = max(ss / area - fs * fs, 0.0)
     tt = max(tt / area - ft * ft, 0.0)
     st = st / area - fs * ft
     # A sliver may come out with a negative determinant by round-off.
     root = np.sqrt(max(ss * tt - st * st, 0.0))
-    st = min(max(st, -np.sqrt(ss * tt)), np.sqrt(ss * tt))
+    most = np.sqrt(ss * tt)
+    st = min(max(st, -most), most)
     trace = np.sqrt(max(ss + tt + 2.0 * root, least * 1e-6))
     row[0] = abs(area)
     row[1] = x0 + fs * tx + ft * rx
     row[2] = y0 + fs * ty + ft * ry
     row[3] = z0 + fs * tz + ft * rz
-    row[4], row[5], row[6] = nx, ny, nz
+    row[4], row[5], row[6] = n
     for q in range(3):
         s = ((ss + root) * TRIANGLE[q, 0] + st * TRIANGLE[q, 1]) / trace
         t = (st * TRIANGLE[q, 0] + (tt + root) * TRIANGLE[q, 1]) / trace

@@ -21,14 +21,14 @@ from kernels.decorators import inner
 def _without_face(w, polygon, top, face, normal, round_off):
     """Take the polygon in slot `face` off one of the stack -> new top; uses the slot before `face`."""
     for k in range(w.corners[face]):
-        outside, inside = split_by_edge(w, polygon, face, k, normal, top + 1, face - 1, round_off)
+        outside, inside = split_by_edge(w, polygon, face, k, normal, top + 1, face - 1, round_off, 0)
         if not inside:
             return top
         if outside:
-            copy_polygon(w, face - 1, polygon)
+            copy_polygon(w, face - 1, polygon, 0)
             top += 1
     if polygon != top:
-        copy_polygon(w, top, polygon)
+        copy_polygon(w, top, polygon, 0)
     return top - 1
 
 
@@ -43,7 +43,7 @@ def _beside_void(cut, tag, count, top):
         for f in range(w.faces[piece]):
             if w.tag[piece, f] != (tag ^ 1):
                 continue
-            load_face(w, piece, f, face)
+            load_face(w, piece, f, face, 0)
             about = sense(w, face, normal[g, 0], normal[g, 1], normal[g, 2])
             for polygon in range(top, -1, -1):
                 corners = w.corners[face] + w.corners[polygon]
@@ -88,7 +88,7 @@ def claim_rest(cut, count, n_near, n_part, origin, n_wet):
                 # What bodies claim is written behind the last polygon and written over.
                 state, loaded, top, _ = claim_face(cut, piece, f, n_near, origin, 0, n_wet)
                 if not loaded:
-                    load_face(w, piece, f, 0)
+                    load_face(w, piece, f, 0, 0)
                 if state == DONE:
                     state, top = _beside_void(cut, tag, count, top)
                 for polygon in range(top + 1):

@@ -9,18 +9,25 @@ between two pieces, and cancel over the pieces of a cell (else see `unclaimed_fa
 from __future__ import annotations
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL, WORKSPACE_FULL, interpolated
-from fluid.cut.polygons import copy_polygon, face_area, load_face, polygon_area, polygon_rule, split_polygon
+from fluid.cut.polygons import (
+    across,
+    copy_polygon,
+    face_area,
+    load_face,
+    polygon_area,
+    split_polygon,
+    triangle_rule,
+)
 from kernels.decorators import inlined
 
 
 @inlined
 def _lies_in(w, piece, f, r, normals, round_off):
-    """Whether a face lies in near plane r, with the piece on the outer side of it."""
+    """Whether a face whose first corner lies in near plane r lies in it with all corners, the piece on the outer side
+    of it."""
     g = w.near_plane[r]
-    if w.tag[piece, f] == 2 * g:
-        return True
     corners = w.size[piece, f]
-    for k in range(corners):
+    for k in range(1, corners):
         if abs(interpolated(w.x[w.loop[piece, f, k]], w.near_distance[r])) > round_off:
             return False
     o = w.loop[piece, f, 0]
@@ -41,20 +48,21 @@ def _claim(w, polygon, at, plane, round_off, top):
     The part inside replaces the polygon and the remainders go on top of the stack; if no part is inside, the polygon
     stays unchanged."""
     work, inner = len(w.corners) - 1, len(w.corners) - 2
-    copy_polygon(w, polygon, work)
-    new_top = top
+    rest, new_top = polygon, top
     for r in range(w.near_start[at], w.near_start[at + 1]):
         if r == plane:
             continue
-        for k in range(w.corners[work]):
-            w.height[k] = interpolated(w.polygon[work, k], w.near_distance[r])
-        outside, inside = split_polygon(w, work, new_top + 1, inner, round_off)
+        for k in range(w.corners[rest]):
+            w.height[k] = interpolated(w.polygon[rest, k], w.near_distance[r])
+        outside, inside = split_polygon(w, rest, new_top + 1, inner, round_off, 0)
         if not inside:
             return False, top
         if outside:
-            copy_polygon(w, inner, work)
+            copy_polygon(w, inner, work, 0)
+            rest = work
             new_top += 1
-    copy_polygon(w, work, polygon)
+    if rest == work:
+        copy_polygon(w, work, polygon, 0)
     return True, new_top
 
 
@@ -75,7 +83,7 @@ def _claim_face(cut, at, r, origin, top, part, n_wet):
         if state != DONE:
             return state, top, n_wet
         if polygon != top:
-            copy_polygon(w, top, polygon)
+            copy_polygon(w, top, polygon, 0)
         top -= 1
     return DONE, top, n_wet
 
@@ -86,21 +94,17 @@ def append_polygon(cut, polygon, at, n, origin, part, n_wet):
 
     Triangles, because the water surface may clip them later."""
     w, out = cut.work, cut.out
-    triangle = len(w.corners) - 1
-    w.corners[triangle] = 3
-    for second in range(1, w.corners[polygon] - 1):
+    corners, plane = w.polygon[polygon], across(n[0], n[1], n[2])
+    for second in range(2, w.corners[polygon]):
         if n_wet >= len(out.wet_part):
             return OUTPUT_FULL, n_wet
         row = out.wet[n_wet]
-        for k in range(3):
-            corner = 0 if k == 0 else second + k - 1
-            for c in range(7):
-                w.polygon[triangle, k, c] = w.polygon[polygon, corner, c]
-            for c in range(3):
-                row[16 + 3 * k + c] = w.polygon[polygon, corner, 4 + c]
-        polygon_rule(w, triangle, n[0], n[1], n[2], cut.limits.least, row)
+        triangle_rule(corners, second - 1, second, n, plane, cut.limits.least, row)
         if row[0] > 0.0:
             for c in range(3):
+                row[16 + c] = corners[0, 4 + c]
+                row[19 + c] = corners[second - 1, 4 + c]
+                row[22 + c] = corners[second, 4 + c]
                 for q in (1, 7, 10, 13, 16, 19, 22):
                     row[q + c] += origin[c]
             out.wet_part[n_wet] = part
@@ -117,12 +121,18 @@ def claim_face(cut, piece, f, n_near, origin, part, n_wet):
     compete for the same part."""
     w, normals, round_off = cut.work, cut.planes.normal, cut.limits.round_off
     top, loaded = 0, False
+    own, first = w.tag[piece, f], w.x[w.loop[piece, f, 0]]
     for at in range(n_near):
         for r in range(w.near_start[at], w.near_start[at + 1]):
-            if top < 0 or not _lies_in(w, piece, f, r, normals, round_off):
+            if own != 2 * w.near_plane[r] and (
+                abs(interpolated(first, w.near_distance[r])) > round_off
+                or not _lies_in(w, piece, f, r, normals, round_off)
+            ):
+                continue
+            if top < 0:
                 continue
             if not loaded:
-                load_face(w, piece, f, 0)
+                load_face(w, piece, f, 0, 0)
                 loaded = True
             state, top, n_wet = _claim_face(cut, at, r, origin, top, part, n_wet)
             if state != DONE:
