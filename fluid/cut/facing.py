@@ -20,10 +20,8 @@ def facing(bodies, polygons, reach, bounds, loose):
     polygons: body (S,), centroid (S, 3) [m], normal (S, 3) out of the body · bounds (2, 3) [m] of the tank · loose
     (n_bodies,) bool: a polygon counts only if its own body or the one opposite is loose; sides of the tank are not
     loose."""
-    body, centroid, normal = polygons
-    box = bodies.bounds()
+    body, box = polygons[0], bodies.bounds()
     near = near_bodies(box[:, 0], box[:, 1], loose, float(reach.max(initial=0.0)))
-    polygons = (body, np.ascontiguousarray(centroid), np.ascontiguousarray(normal))
     in_film, plane = np.zeros(len(body), bool), np.empty(len(body), np.int64)
     over(
         _facing,

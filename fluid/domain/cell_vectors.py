@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Floats, Ints
-from kernels.decorators import inner
+from kernels.decorators import inner, kernel
 
 
 class CellVectors(NamedTuple):
@@ -39,17 +39,31 @@ class CellVectors(NamedTuple):
         """The same with another numbering of the cells.
 
         source (M,): old number of each cell, of `count`; -1 for none, which has zero."""
-        place = np.full(count + 1, -1, np.int64)  # the last entry stands for "none"
-        place[self.cells] = np.arange(len(self.cells))
-        row = place[source]
-        cells = np.flatnonzero(row >= 0)
-        return CellVectors(cells, self.values[row[cells]])
+        return CellVectors(*_carried(self.cells, self.values, source, count))
 
     def joined(self, cells, values) -> CellVectors:
         """With the values (k, 3) of further cells (k,), none of which is in the list."""
         every = np.concatenate([self.cells, cells])
         order = np.argsort(every, kind="stable")
         return CellVectors(every[order], np.concatenate([self.values, values])[order])
+
+
+@kernel
+def _carried(cells, values, source, count):
+    """`CellVectors.carried`: the cells (k,) that continue one of the listed `cells` (n,), and the values (k, 3)."""
+    place, k = np.full(count, -1, np.int32), 0
+    for s in range(len(cells)):
+        place[cells[s]] = s
+    for e in range(len(source)):
+        k += source[e] >= 0 and place[source[e]] >= 0
+    found, taken, k = np.empty(k, np.int64), np.empty((k, 3)), 0
+    for e in range(len(source)):
+        if source[e] >= 0 and place[source[e]] >= 0:
+            found[k] = e
+            for c in range(3):
+                taken[k, c] = values[place[source[e]], c]
+            k += 1
+    return found, taken
 
 
 @inner

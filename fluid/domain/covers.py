@@ -76,7 +76,7 @@ OPENINGS = {"all": Connection(), "wide": WIDE_OPENINGS, "edges": EDGES_APART}
 class VirtualElements(NamedTuple):
     """parent (M,) background cell of each element, ascending · part (M,) row of its cut part, -1 whole · start
     (cells + 1,) first element of each cell · in_slit (M,) bool: its contacts count over any area · beside (M, 3): of
-    `lies_on`."""
+    `lies_on`; both are read where thresholds count alone, and empty elsewhere."""
 
     parent: Ints
     part: Ints
@@ -93,13 +93,14 @@ def virtual_cells(mesh, elements, contacts, connection, part_in_slit, part_besid
     part_beside (K, 3): normal of the face that each cut part lies on, zero beside an edge (`lies_on`)
     -> cells (M, 4), parent_node (N,)."""
     several = _nodes_with_choice(mesh.cells, elements.part, elements.start, len(mesh.nodes))
-    in_slit = np.append(part_in_slit, False)[elements.part]
-    beside = np.append(part_beside, np.zeros((1, 3)), axis=0)[elements.part]
+    in_slit, beside = np.zeros(0, bool), np.zeros((0, 3))
+    if connection.face > 0.0:  # without a threshold all contacts count alike
+        in_slit = np.append(part_in_slit, False)[elements.part]
+        beside = np.append(part_beside, np.zeros((1, 3)), axis=0)[elements.part]
     virtual = VirtualElements(elements.parent, elements.part, elements.start, in_slit, beside)
     least = NO_AREA * mesh.spacing**2
     label = _unite_corners(mesh.cells, mesh.neighbours, virtual, several, contacts, connection.face, least)
-    number, parent_node = _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
-    return number.astype(np.uint32), parent_node
+    return _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
 
 
 def lies_on(part, normal, area, n_parts: int) -> Array:
@@ -154,7 +155,7 @@ def _nodes_with_choice(cells, part, start, n_nodes):
 def _numbered(cells, parent, several, label, n_nodes):
     """Number the copies by background node, then by first element -> cells (M, 4), parent_node (N,)."""
     copies = np.zeros(n_nodes, np.int64)
-    number = np.zeros((len(parent), 4), np.int64)
+    number = np.zeros((len(parent), 4), np.uint32)
     for e in range(len(parent)):
         for k in range(4):
             node = cells[parent[e], k]
@@ -175,7 +176,7 @@ def _numbered(cells, parent, several, label, n_nodes):
     for e in range(len(parent)):
         for k in range(4):
             node = cells[parent[e], k]
-            number[e, k] += last[node] - copies[node]
+            number[e, k] += np.uint32(last[node] - copies[node])
     return number, parent_node
 
 

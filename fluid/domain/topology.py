@@ -239,15 +239,16 @@ def covered_nodes(domain) -> Array:
         return np.zeros(len(d.nodes), bool)
     start, members = polygons_of_nodes(d.face_cell, d.cells, len(d.nodes))
     surface, least = (d.face_body, d.face_centroid, d.face_normal), 2.0 * d.memory.mesh.tolerance
-    return _covered(start, members, d.nodes, *surface, d.n_bodies, least)
+    covered = np.zeros(len(d.nodes), bool)
+    over(_covered, len(covered), start, members, d.nodes, *surface, d.n_bodies, least, covered)
+    return covered
 
 
-@kernel
-def _covered(start, members, nodes, body, centroid, normal, n_bodies, least):
-    covered = np.zeros(len(nodes), np.bool_)
+@released
+def _covered(first, last, start, members, nodes, body, centroid, normal, n_bodies, least, covered):
     # marks of the current node: bodies met so far, and bodies with a face that the node is in front of
     seen, in_front = np.full(n_bodies, -1, np.int64), np.full(n_bodies, -1, np.int64)
-    for i in range(len(nodes)):
+    for i in range(first, last):
         behind = 0
         for t in range(start[i], start[i + 1]):
             s = members[t] // 4
@@ -262,7 +263,6 @@ def _covered(start, members, nodes, body, centroid, normal, n_bodies, least):
                 in_front[b] = i
                 behind -= 1
         covered[i] = behind > 0
-    return covered
 
 
 @kernel
@@ -322,7 +322,10 @@ def _cells_of_nodes(cells, n):
 def _neighbours_in(mesh, nodes, cells, parent):
     """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
     if len(nodes) > len(mesh.nodes):
-        return _neighbours(mesh.neighbours, cells, parent, len(mesh.cells))
+        found = np.full(cells.shape, -1, np.int32)
+        rows = first_rows(parent, len(mesh.cells))
+        over(_neighbours, len(cells), mesh.neighbours, cells, parent, rows, found, weight=WORK)
+        return found
     if cells is mesh.cells:
         return mesh.neighbours
     row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry stands for "no neighbour", -1
@@ -333,16 +336,12 @@ def _neighbours_in(mesh, nodes, cells, parent):
     return found
 
 
-@kernel
-def _neighbours(parent_neighbours, cells, parent, n_parents):
-    """Copies of the parents' neighbours that share the three nodes of the face."""
-    start = np.zeros(n_parents + 1, np.int64)
-    for e in range(cells.shape[0]):
-        start[parent[e] + 1] += 1
-    for k in range(n_parents):
-        start[k + 1] += start[k]
-    found = np.full(cells.shape, -1, np.int32)
-    for e in range(cells.shape[0]):
+@ranged
+def _neighbours(first, last, parent_neighbours, cells, parent, start, found):
+    """found (M, 4) ← copies of the parents' neighbours that share the three nodes of the face, where there are any.
+
+    start (parents + 1,): first cell of each parent."""
+    for e in range(first, last):
         for a in range(4):
             p = parent_neighbours[parent[e], a]
             if p < 0:
@@ -356,7 +355,6 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
                 if shared == 3:
                     found[e, a] = other
                     break
-    return found
 
 
 def _concatenated(parts):

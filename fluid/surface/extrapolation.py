@@ -363,7 +363,10 @@ def fill_missing(topology, known, *fields):
     while missing.any():
         before = missing.sum()
         seed = known & topology.active
-        order, start, _ = layers_around(seed, 4, *topology.around)
+        # from the known nodes beside missing ones alone: most are far from any
+        beside = np.zeros(len(seed), bool)
+        over(_beside, len(seed), missing, seed, topology.around, beside)
+        order, start, _ = layers_around(beside, 4, *topology.around, missing | beside)
         for f in fields:
             _fill(topology, order, start, 0, f, np.zeros((1, f.shape[1], 3)), seed.copy(), _NO_LIMIT)
         known = known.copy()
@@ -371,6 +374,18 @@ def fill_missing(topology, known, *fields):
         missing = topology.active & ~known
         if missing.sum() == before:  # a pocket without any known node: it starts at rest
             return
+
+
+@ranged
+def _beside(first, last, missing, seed, around, found):
+    """found (N,) bool ← the seeds, seed (N,) bool, around the missing nodes; several threads may mark one node."""
+    start, neighbours = around
+    for j in range(first, last):
+        i = np.uint64(j)
+        if missing[i]:
+            for t in range(start[i], start[i + np.uint64(1)]):
+                if seed[neighbours[t]]:
+                    found[neighbours[t]] = True
 
 
 def _fill(t, order, start, linear, f, gradient, done, least):
