@@ -31,6 +31,8 @@ STATE = 13
 """Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
 _SAVED = [0, 1, 2, 12, 9, 10, 11, 3, 4, 5, 6, 7, 8]
 """Of these, in the order of a saved state: position, orientation (w x y z), velocity, spin."""
+_FORCES, _MOMENTS = struct.Struct("3d24x").iter_unpack, struct.Struct("24x3d").iter_unpack
+"""Rows [force, moment] as tuples of the one and of the other, sooner than NumPy makes lists of them."""
 
 _ENDS = attrgetter("id1", "id2")
 
@@ -145,8 +147,9 @@ class Scene:
 
         YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
         forces = self.O.forces
-        deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
-        deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
+        F = np.ascontiguousarray(F)
+        deque(map(forces.addF, ids, _FORCES(F)), maxlen=0)
+        deque(map(forces.addT, ids, _MOMENTS(F)), maxlen=0)
         self.O.dt = dt
         self._spin_is_read[:] = False
         self.O.step()
