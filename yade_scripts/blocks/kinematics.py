@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.decorators import inner, kernel, plain
+from kernels.lanes import for_both
 
 
 @inner
@@ -19,7 +20,7 @@ def rotation_matrix(q, R):
     R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
 
 
-@plain
+@for_both
 def place(row, R, x, local):
     """World position of a body point local (3,), as a tuple; row < 0 stands for the fixed world."""
     if row < 0:
@@ -28,7 +29,7 @@ def place(row, R, x, local):
     return x[row, 0] + r0, x[row, 1] + r1, x[row, 2] + r2
 
 
-@plain
+@for_both
 def turned(row, R, local):
     """A direction of the body frame in world axes, as a tuple."""
     return (
@@ -38,19 +39,19 @@ def turned(row, R, local):
     )
 
 
-@plain
+@for_both
 def dot(a, b):
     """a·b of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@plain
+@for_both
 def cross(a, b):
     """a × b of two vectors, as a tuple."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@plain
+@for_both
 def arm(row, x, at):
     """Lever of the world point `at` about the centre of a block, as a tuple; zero for the fixed world."""
     if row < 0:
@@ -58,7 +59,7 @@ def arm(row, x, at):
     return at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
 
 
-@plain
+@for_both
 def parting(ra, rb, x, v, at):
     """Relative velocity of b against a, both taken at the world point `at`, as a tuple; v (n, 6) [v, ω]."""
     a0, a1, a2 = point_velocity(ra, x, v, at)
@@ -66,7 +67,7 @@ def parting(ra, rb, x, v, at):
     return b0 - a0, b1 - a1, b2 - a2
 
 
-@inner
+@for_both
 def point_velocity(row, x, v, at):
     """Velocity of the body point now at `at`, as a tuple; v (n, 6) [v, ω]."""
     if row < 0:

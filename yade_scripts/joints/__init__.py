@@ -6,6 +6,7 @@ cohesion, mixed_modes         parameters of the joints; how opening and sliding 
 rules                         which touching faces are joined, and with which parameters
 joints                        the joints of a structure: built, moved through time, reported
 kernel, forces, specialise    their loops, compiled for each law and mixed mode
+fours                         four points at a time, in the same loops
 arrays                        what these loops take
 seals                         faces without a joint that keep water out as long as they lie on one another
 

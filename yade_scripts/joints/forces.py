@@ -23,35 +23,34 @@ from functools import cache
 import numpy as np
 
 from kernels.decorators import plain
+from kernels.lanes import LANES, added
 from yade_scripts.blocks.kinematics import arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
-from yade_scripts.joints.kernel import facing, facing_and_lean, split
+from yade_scripts.joints.arrays import (
+    BETA,
+    DF,
+    K0,
+    KC,
+    LAST,
+    MU,
+    NOT_GROWING,
+    OLDER,
+    PULL,
+    SLOW,
+    UNIT,
+    WORK,
+)
+from yade_scripts.joints.fours import four_points, softened_fours, summed
+from yade_scripts.joints.kernel import dashpot, facing, facing_and_lean, split
 from yade_scripts.joints.law import CohesiveLaw
 from yade_scripts.joints.specialise import source_checksum, specialised
 
-UNIT, DF, BETA, KC, K0, MU = range(6)
-"""Columns of the law of a joint (J, 6): T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m], μ where it has failed."""
 STICKS = 1.0 - 1e-9
 """Share of μ |t_n| below which a failed point sticks."""
-WORK, PULL, LAST, OLDER = 0, 1, 2, 3
-"""Columns of `paid` (P, 4): work taken [J/m²], traction of the last substep [Pa], NOT_GROWING before, δ_n in the last
-substep and in the one before it [m]."""
-NOT_GROWING = -1.0
 SHARP = 8.0
 """The mean traction has its full weight from Δ = δ_f/SHARP on."""
-SLOW = 0.005
-"""Below Δ = SLOW δ_f the weight is under 0.2 %: the traction is T itself, which saves the account."""
 
 secant = work = measure = pace = response = stored = None  # given by `kernels_of`
-
-
-@plain
-def dashpot(eta, kn, kt, w, n):
-    """Traction η (k_n w_n n + k_t w_t) of the relative velocity w as a tuple, and its power [W/m²]."""
-    wn = dot(w, n)
-    along, across = eta * (kn - kt) * wn, eta * kt
-    t = (along * n[0] + across * w[0], along * n[1] + across * w[1], along * n[2] + across * w[2])
-    return t, dot(t, w)
 
 
 @plain
@@ -144,7 +143,7 @@ def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, giv
     dt [s] · given (l, 6): force and moment on block a about its centre, filled · taken_by: Taken, is added to
     →   largest growth of λ/δ_f in this call
     """
-    a, b, start, xi_a, xi_b, weight, normal, law, peak = joints
+    a, b, start, xi_a, xi_b, weight, normal, law, peak, _, first_four = joints
     largest, paid, rub = memory
     x, v, R = motion
     damped, rubbed = taken_by
@@ -156,52 +155,67 @@ def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, giv
         kc = law[j, KC]
         n, lean = facing_and_lean(ra, rb, R, normal[j])
         f0 = f1 = f2 = m0 = m1 = m2 = g0 = g1 = g2 = 0.0
-        for p in range(start[j], start[j + 1]):
-            pa, pb = place(ra, R, x, xi_a[p]), place(rb, R, x, xi_b[p])
-            mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
-            dn, s = split(pa, pb, n)
-            ss = dot(s, s)
-            before, now = largest[p], measure(dn, ss, beta)
-            after = max(before, now)
-            ks = softened(unit, after / df, peak)
-            if advance:
-                largest[p] = after
-                fastest = max(fastest, (after - before) / df)
-                if before < now and before < df and dt > 0.0:
-                    w = parting(ra, rb, x, v, mid)
-                    move = dt * pace(dn, ss, dot(w, n), dot(w, s), beta)
-                    ks = torn_traction(before, now, move, ks, dn, kc, unit, df, peak, paid[p]) / now
-                else:
-                    paid[p, PULL] = NOT_GROWING
-            tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
-            if advance:
-                one_sided = kc - ks if dn < 0.0 else ks - kc
-                if one_sided > 0.0 and dt > 0.0 and (dn < 0.0 or paid[p, PULL] == NOT_GROWING):
-                    tn -= one_sided * beyond_the_kink(dn, dn - paid[p, LAST], df)
-                paid[p, OLDER] = paid[p, LAST]
-                paid[p, LAST] = dn
-            t0, t1, t2 = tn * n[0] + kt * s[0], tn * n[1] + kt * s[1], tn * n[2] + kt * s[2]
-            g = weight[p] * (tn - kt * dn)
-            g0, g1, g2 = g0 + g * s[0], g1 + g * s[1], g2 + g * s[2]
-            if eta > 0.0:
-                c, power = dashpot(eta, kn, kt, parting(ra, rb, x, v, mid), n)
-                t0, t1, t2 = t0 + c[0], t1 + c[1], t2 + c[2]
+        last = start[j + 1]
+        for four, first in enumerate(range(start[j], last, LANES)):
+            if advance and dt > 0.0:
+                done, growth, force, moment, side, lost = four_points(
+                    first, last, first_four[j] + four, j, joints, memory, motion, n, eta, dt
+                )
+                if done:
+                    count = min(LANES, last - first)
+                    fastest = max(fastest, growth)
+                    f0, f1, f2 = summed((f0, f1, f2), force, count)
+                    m0, m1, m2 = summed((m0, m1, m2), moment, count)
+                    g0, g1, g2 = summed((g0, g1, g2), side, count)
+                    if eta > 0.0:
+                        damped[j] = added(damped[j], lost, count)
+                    continue
+            for p in range(first, min(first + LANES, last)):
+                pa, pb = place(ra, R, x, xi_a[p]), place(rb, R, x, xi_b[p])
+                mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
+                dn, s = split(pa, pb, n)
+                ss = dot(s, s)
+                before, now = largest[p], measure(dn, ss, beta)
+                after = max(before, now)
+                ks = softened(unit, after / df, peak)
                 if advance:
-                    damped[j] += weight[p] * power * dt
-            if after >= df and law[j, MU] > 0.0:
-                taken, S, k = 0.0, (0.0, 0.0, 0.0), beta**2 * k0
-                if dn < 0.0 and before >= df:
-                    w = parting(ra, rb, x, v, mid)
-                    wn = dt * dot(w, n)
-                    move = (dt * w[0] - wn * n[0], dt * w[1] - wn * n[1], dt * w[2] - wn * n[2])
-                    S, taken = rubbing(s, turned(ra, R, rub[p]), k, -law[j, MU] * tn, move)
+                    largest[p] = after
+                    fastest = max(fastest, (after - before) / df)
+                    if before < now and before < df and dt > 0.0:
+                        w = parting(ra, rb, x, v, mid)
+                        move = dt * pace(dn, ss, dot(w, n), dot(w, s), beta)
+                        ks = torn_traction(before, now, move, ks, dn, kc, unit, df, peak, paid[p]) / now
+                    else:
+                        paid[p, PULL] = NOT_GROWING
+                tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
                 if advance:
-                    rubbed[j] += weight[p] * taken
-                    stuck_at(s, S, k, ra, R, rub[p])
-                t0, t1, t2 = t0 + S[0], t1 + S[1], t2 + S[2]
-            t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
-            c0, c1, c2 = cross(arm(ra, x, mid), t)
-            f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
+                    one_sided = kc - ks if dn < 0.0 else ks - kc
+                    if one_sided > 0.0 and dt > 0.0 and (dn < 0.0 or paid[p, PULL] == NOT_GROWING):
+                        tn -= one_sided * beyond_the_kink(dn, dn - paid[p, LAST], df)
+                    paid[p, OLDER] = paid[p, LAST]
+                    paid[p, LAST] = dn
+                t0, t1, t2 = tn * n[0] + kt * s[0], tn * n[1] + kt * s[1], tn * n[2] + kt * s[2]
+                g = weight[p] * (tn - kt * dn)
+                g0, g1, g2 = g0 + g * s[0], g1 + g * s[1], g2 + g * s[2]
+                if eta > 0.0:
+                    c, power = dashpot(eta, kn, kt, parting(ra, rb, x, v, mid), n)
+                    t0, t1, t2 = t0 + c[0], t1 + c[1], t2 + c[2]
+                    if advance:
+                        damped[j] += weight[p] * power * dt
+                if after >= df and law[j, MU] > 0.0:
+                    taken, S, k = 0.0, (0.0, 0.0, 0.0), beta**2 * k0
+                    if dn < 0.0 and before >= df:
+                        w = parting(ra, rb, x, v, mid)
+                        wn = dt * dot(w, n)
+                        move = (dt * w[0] - wn * n[0], dt * w[1] - wn * n[1], dt * w[2] - wn * n[2])
+                        S, taken = rubbing(s, turned(ra, R, rub[p]), k, -law[j, MU] * tn, move)
+                    if advance:
+                        rubbed[j] += weight[p] * taken
+                        stuck_at(s, S, k, ra, R, rub[p])
+                    t0, t1, t2 = t0 + S[0], t1 + S[1], t2 + S[2]
+                t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
+                c0, c1, c2 = cross(arm(ra, x, mid), t)
+                f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
         c0, c1, c2 = cross(lean, (g0, g1, g2))
         m0, m1, m2 = m0 - 0.5 * c0, m1 - 0.5 * c1, m2 - 0.5 * c2
         given[i, 0], given[i, 1], given[i, 2] = f0, f1, f2
@@ -214,7 +228,7 @@ def stored_between(live, joints, memory, now, before, out):
 
     Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
     """
-    a, b, start, xi_a, xi_b, weight, normal, law, peak = joints
+    a, b, start, xi_a, xi_b, weight, normal, law, peak, _, _ = joints
     largest, rub = memory.largest, memory.rub
     x, R = now
     x0, R0 = before
@@ -332,19 +346,22 @@ def kernels_of(law: str, mixed_mode: str) -> JointKernels:
 
 @cache
 def _kernels(law: str, chosen: CohesiveLaw, mixed_mode: str) -> JointKernels:
-    mode = mixed_modes.find(mixed_mode)
-    name = f"{law}_{mixed_mode}_{source_checksum(chosen.secant, chosen.work):08x}"
-
-    def inner(function, **functions):
-        return specialised(function, name, cache=False, **functions)
-
-    names = {"secant": chosen.secant, "work": chosen.work}
-    names["softened"] = inner(softened, **names)
-    names["separation_work"] = inner(separation_work, **names)
-    names["torn_traction"] = inner(torn_traction, **names)
-    names |= {part: getattr(mode, part) for part in ("measure", "pace", "response", "stored")}
+    name, names = functions_of(law, chosen, mixed_mode)
     parts = (stored_between, lost, point_springs, point_tangents)
     return JointKernels(
         specialised(joint_forces, name, ranged=True, **names),
         *(specialised(part, name, **names) for part in parts),
     )
+
+
+def functions_of(law: str, chosen: CohesiveLaw, mixed_mode: str) -> tuple[str, dict[str, Callable]]:
+    """Of the law `chosen`, called `law`, and a mixed mode: a name of both, and what stands for the functions by these
+    names in the kernels."""
+    mode = mixed_modes.find(mixed_mode)
+    name = f"{law}_{mixed_mode}_{source_checksum(chosen.secant, chosen.work):08x}"
+    names = {"secant": chosen.secant, "work": chosen.work}
+    for function in (softened, separation_work, torn_traction, softened_fours):
+        names[function.__name__] = specialised(function, name, cache=False, **names)
+    names |= {part: getattr(mode, part) for part in ("measure", "pace", "response", "stored")}
+    names["four_points"] = specialised(four_points, name, inlined=True, **names)
+    return name, names

@@ -13,7 +13,7 @@ from kernels.ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joints import kernel
-from yade_scripts.joints.arrays import JointPoints, Placement, PointMemory, Taken
+from yade_scripts.joints.arrays import JointPoints, Placement, PointMemory, Taken, in_fours
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
 from yade_scripts.joints.seals import both_faces
@@ -106,6 +106,7 @@ class Joints:
         unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
         self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0, np.zeros(n)], axis=1)
         """Columns as in `joint_forces`."""
+        self._fours = in_fours(self.start, self.xi_a, self.xi_b, self.weight)
         self._points = [self._of_law(peak) for _, peak in self.families]
         self._keeps_out = np.array([law.uplift == "none" for law in laws], bool)
         self._by_damage = np.array([law.uplift == "damage" for law in laws], bool)
@@ -160,8 +161,9 @@ class Joints:
     def _of_law(self, peak: float) -> JointPoints:
         """What never changes, as kernels take it; peak: of the law."""
         return JointPoints(
-            self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law, peak
-        )
+            self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law, peak,
+            *self._fours,
+        )  # fmt: skip
 
     def _memory(self) -> PointMemory:
         return PointMemory(self.largest, self.paid, self.rub)

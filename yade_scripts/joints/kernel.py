@@ -19,11 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import kernel, plain
+from kernels.decorators import inlined, kernel, plain
+from kernels.lanes import for_both
 from yade_scripts.blocks.kinematics import add_forces, dot, place, turned
 
 
-@plain
+@for_both
 def split(pa, pb, n):
     """Normal component of the separation pb - pa along n, and its tangential part as a tuple."""
     d = (pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2])
@@ -39,7 +40,7 @@ def facing(a, b, R, normal):
     return n
 
 
-@plain
+@inlined
 def facing_and_lean(a, b, R, normal):
     """As `facing`, and (n_a - n_b)/|n_a + n_b| as a tuple, 0 where the blocks are half a turn apart."""
     n = turned(a, R, normal[0])
@@ -53,6 +54,15 @@ def facing_and_lean(a, b, R, normal):
         (n[1] - k[1]) / size,
         (n[2] - k[2]) / size,
     )
+
+
+@for_both
+def dashpot(eta, kn, kt, w, n):
+    """Traction η (k_n w_n n + k_t w_t) of the relative velocity w as a tuple, and its power [W/m²]."""
+    wn = dot(w, n)
+    along, across = eta * (kn - kt) * wn, eta * kt
+    t = (along * n[0] + across * w[0], along * n[1] + across * w[1], along * n[2] + across * w[2])
+    return t, dot(t, w)
 
 
 @plain

@@ -21,7 +21,8 @@ Its tractions are those of the potential at u = L and follow their tangent for u
 dissipated. G_c is that of pure opening in every mode, since sliding returns its energy to the opening.
 
 Names: `ks` secant stiffness in opening, `ss` = |δ_t|², `k0` first stiffness, `kc` closing stiffness, zero where
-contact carries compression. All per unit area of the joint.
+contact carries compression. All per unit area of the joint. All but `stored` take four points at a time, too
+(`kernels/lanes.py`).
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 from numba import njit
+
+from kernels.lanes import larger, root, where_more
 
 
 class UnknownMixedMode(ValueError):
@@ -54,19 +56,20 @@ class MixedMode:
 @njit
 def effective_measure(dn, ss, beta):
     """sqrt(<δ_n>² + β² |δ_t|²) [m]."""
-    return np.sqrt(max(dn, 0.0) ** 2 + beta**2 * ss)
+    opened = larger(dn, 0.0)
+    return root(opened * opened + beta**2 * ss)
 
 
 @njit
 def effective_pace(dn, ss, wn, sw, beta):
     """Change of the measure along a relative motion with normal part wn and δ_t·w = sw."""
-    return (max(dn, 0.0) * wn + beta**2 * sw) / effective_measure(dn, ss, beta)
+    return (larger(dn, 0.0) * wn + beta**2 * sw) / effective_measure(dn, ss, beta)
 
 
 @njit
 def effective_response(ks, dn, ss, largest, k0, df, beta, kc):
     """Normal traction [Pa], and stiffnesses [Pa/m] normal and in sliding, with the secant ks of the measure."""
-    kn = ks if dn > 0.0 else kc
+    kn = where_more(dn, 0.0, ks, kc)
     return kn * dn, kn, beta**2 * ks
 
 
@@ -89,7 +92,7 @@ def effective_stored(ks, dn, en, slide, largest, k0, df, beta, kc):
 @njit
 def needleman_measure(dn, ss, beta):
     """<δ_n> [m]."""
-    return max(dn, 0.0)
+    return larger(dn, 0.0)
 
 
 @njit
@@ -101,15 +104,15 @@ def needleman_pace(dn, ss, wn, sw, beta):
 @njit
 def needleman_response(ks, dn, ss, largest, k0, df, beta, kc):
     """As `effective_response`; the potential reduces the normal traction by β² k_0 s²/δ_f (1 - L)."""
-    whole = max(1.0 - largest / df, 0.0)
-    kn = ks if dn > 0.0 else kc
+    whole = larger(1.0 - largest / df, 0.0)
+    kn = where_more(dn, 0.0, ks, kc)
     return kn * dn - beta**2 * k0 * ss / df * whole, kn, _needleman_shear(dn, largest, k0, df, beta)
 
 
 @njit
 def _needleman_shear(dn, largest, k0, df, beta):
     """Stiffness in sliding: 27/4 T_max/δ_f α [(1 - L)² + 2 (1 - L)(L - u)]."""
-    whole = max(1.0 - largest / df, 0.0)
+    whole = larger(1.0 - largest / df, 0.0)
     return beta**2 * k0 * whole * (whole + 2.0 * (largest - dn) / df)
 
 

@@ -17,16 +17,26 @@ from kernels.ranges import shared
 
 
 def specialised(
-    kernel: Callable, name: str, cache: bool = True, ranged: bool = False, **chosen: Callable
+    kernel: Callable,
+    name: str,
+    cache: bool = True,
+    ranged: bool = False,
+    inlined: bool = False,
+    **chosen: Callable,
 ) -> Callable:
     """`kernel`, a plain function, compiled with `chosen` in place of the globals of these names.
 
     name: must differ for every choice, since it names the compiled code on disk · ranged: it takes a range first, which
-    several threads may share (`kernels/ranges.py`)
+    several threads may share (`kernels/ranges.py`) · inlined: its code stands
+    where it is called, and it makes no arrays
     """
     copy = FunctionType(kernel.__code__, kernel.__globals__ | chosen, kernel.__name__, kernel.__defaults__)
     copy.__qualname__, copy.__module__ = f"{kernel.__qualname__}_{name}", kernel.__module__
-    return shared(njit, copy, cache=cache, _nrt=False) if ranged else njit(cache=cache)(copy)
+    if ranged:
+        return shared(njit, copy, cache=cache, _nrt=False)
+    if inlined:
+        return njit(cache=False, forceinline=True, _nrt=False)(copy)
+    return njit(cache=cache)(copy)
 
 
 def source_checksum(*functions: Callable) -> int:
