@@ -228,7 +228,7 @@ class Contact(Section):
         0.3, description="e, velocity after a normal impact over the velocity before"
     )
     friction: Annotated[float, InSI("", ge=0)] = Field(
-        0.5, description="mu, largest tangential over normal force"
+        0.5, description="mu, largest tangential over normal force; presets of materials bring their own"
     )
     shear_ratio: Annotated[float, InSI("", gt=0, le=10)] = Field(
         1.0, description="tangential over normal stiffness, K_t/K_n"

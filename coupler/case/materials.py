@@ -67,6 +67,10 @@ PRESETS = {
 }  # fmt: skip
 
 
+class PresetPair(ContactPair):
+    """A pair of materials whose friction a preset gives; those of the case itself are plain `ContactPair`."""
+
+
 def with_presets(case: Case) -> Case:
     """The case with what the presets among its materials say, before what it says itself."""
     if case.structure is None:
@@ -119,7 +123,7 @@ def _why(others: list[str]) -> str:
 
 
 def material_remarks(case: Case) -> Iterator[str]:
-    """Materials that are nearly called like a preset, and a strength that counts nowhere."""
+    """Materials that are nearly called like a preset, and a strength or a friction that presets replace."""
     if case.structure is None:
         return
     movable = _materials(case, held=False)
@@ -139,6 +143,23 @@ def material_remarks(case: Case) -> Iterator[str]:
         yield (
             f"joints.strength counts nowhere: every joint follows from a preset ({', '.join(movable)}). For another "
             f'strength write [[joints.pair]] between = ["{movable[0]}", "{movable[0]}"]'
+        )
+    yield from _friction_remarks(case)
+
+
+def _friction_remarks(case: Case) -> Iterator[str]:
+    """A friction of [contact] that does not apply where the frictions of presets do."""
+    if case.contact is None or "friction" not in case.contact.model_fields_set:
+        return
+    found = [pair for pair in case.contact.pair if isinstance(pair, PresetPair)]
+    found = [pair for pair in found if pair.friction != case.contact.friction]
+    if found:
+        listed = ", ".join(f"{pair.friction:g} between {' and '.join(pair.materials)}" for pair in found)
+        first = ", ".join(f'"{name}"' for name in found[0].materials)
+        yield (
+            f"contact.friction = {case.contact.friction:g} does not apply where the friction of presets does: "
+            f"{listed}. For another one write [[contact.pair]] materials = [{first}], friction = "
+            f"{case.contact.friction:g}"
         )
 
 
@@ -241,7 +262,7 @@ def _friction(case: Case, used: dict[str, Material]) -> tuple[ContactPair, ...]:
     for name, one in used.items():
         wanted |= {frozenset((name, other)): min(one.friction, also.friction) for other, also in used.items()}
     more = [
-        ContactPair(materials=(min(names), max(names)), friction=friction)
+        PresetPair(materials=(min(names), max(names)), friction=friction)
         for names, friction in wanted.items()
         if names not in given
     ]

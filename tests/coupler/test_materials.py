@@ -174,6 +174,26 @@ def test_a_name_near_a_preset_and_a_strength_that_counts_nowhere_are_told(tmp_pa
     assert any("joints.strength counts nowhere" in line for line in remarks(load(tmp_path).case))
 
 
+def test_a_friction_that_presets_replace_is_told_where_it_does_not_apply(tmp_path):
+    """Else a sweep over contact.friction makes the same run again and again, and nobody learns why."""
+
+    def told(friction, pair=""):
+        text = QUAY.replace("[contact]", f"[contact]\n{friction}\n{pair}")
+        (tmp_path / "case.toml").write_text(text)
+        return [line for line in remarks(load(tmp_path).case) if line.startswith("contact.friction")]
+
+    brick = PRESETS["brick-masonry"].friction
+    (line,) = told("friction = 0.2")
+    assert line.startswith("contact.friction = 0.2 does not apply")
+    assert f"{brick:g} between brick-masonry and brick-masonry" in line
+    assert "[[contact.pair]] materials = [" in line
+    assert not told("")
+    assert f"{brick:g} between" not in "".join(told(f"friction = {brick}"))
+    own = '[[contact.pair]]\nmaterials = ["brick-masonry", "brick-masonry"]\nfriction = 0.3\n'
+    (line,) = told("friction = 0.2", own)
+    assert "brick-masonry and brick-masonry" not in line
+
+
 def test_blocks_that_are_not_to_be_glued_to_the_ground_are_not_by_a_preset_either(tmp_path):
     (tmp_path / "case.toml").write_text(CASE.replace("[joints]", "[joints]\nground = false"))
     assert all("ground" not in pair.between for pair in load(tmp_path).case.joints.pair)

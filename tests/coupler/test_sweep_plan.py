@@ -494,3 +494,14 @@ def test_a_run_takes_no_notice_of_the_section(case):
 
     plain = effective(load(case()).case)
     assert effective(load(case(DRAWN.format(sample="latin", samples=4, ends="[0.01]"))).case) == plain
+
+
+def test_a_varied_friction_that_a_preset_replaces_is_told_before_the_runs(case):
+    """All rows would give the same numbers, and a fragility curve would show no scatter."""
+    text = WATER.replace("centre = [3, 0.5, 0.25]", 'centre = [3, 0.5, 0.25]\nmaterial = "concrete"')
+    vary = '[[sweep.vary]]\nkey = "contact.friction"\nvalues = [0.3, 0.4]\n'
+    (remark,) = make_plan(case(vary, text=text)).remarks
+    assert remark.startswith("what is varied may have no effect: contact.friction = 0.3 does not apply")
+    assert not make_plan(case(vary, text=WATER)).remarks
+    other = vary.replace("contact.friction", "contact.restitution")
+    assert not make_plan(case(other, text=text)).remarks

@@ -17,6 +17,7 @@ import numpy as np
 
 from coupler.case.case import effective
 from coupler.case.formula import BadFormula, evaluate
+from coupler.case.materials import material_remarks
 from coupler.case.paths import BadPath, place_of
 from coupler.case.sweep import NEEDS, Sweep, Varied
 from coupler.case.sweep_names import OWN, amount, design_problems, in_si, sweep_problems, unit, unit_of
@@ -115,7 +116,7 @@ def _with(sweep: Sweep, vary: Iterable[str], overrides: tuple[str, ...]) -> Swee
 
 
 class _Planner:
-    """Collects rows, runs and what is wrong with them."""
+    """Collects rows, runs and what is wrong with them; replaced: remarks on keys that materials replace, by key."""
 
     def __init__(self, file: CaseFile, sweep: Sweep):
         self.file, self.sweep = file, sweep
@@ -126,6 +127,7 @@ class _Planner:
         self.needs_free = any(q.source == "free field" for q in asked(sweep))
         self.runs: dict[str, tuple[str, ...]] = {}
         self.cases: dict[str, dict] = {}
+        self.replaced: dict[str, str] = {}
 
     def _table(self) -> InputTable | None:
         if self.sweep.table is None:
@@ -277,7 +279,10 @@ class _Planner:
 
     def _add(self, overrides: tuple[str, ...], first: bool = False) -> str:
         """The id of the run with these overrides. Raises BadCase where they are no case."""
-        content = effective(load(self.file.path, overrides).case)
+        case = load(self.file.path, overrides).case
+        for remark in material_remarks(case):
+            self.replaced.setdefault(remark.split()[0], remark)
+        content = effective(case)
         id = identity(content)
         if id not in self.runs:
             self.runs = {id: overrides, **self.runs} if first else {**self.runs, id: overrides}
@@ -320,6 +325,10 @@ class _Planner:
             yield f"samples = {n}: Sobol points are even for powers of two ({low} or {2 * low})"
         if len(self.runs) < len({row.id for row in rows if not row.wrong}) and not self.needs_free:
             yield "rows with the same case share a run"
+        keys = {key for v in self.sweep.vary for key in v.keys}
+        keys |= {head.key for head in (self.table.heads if self.table else ()) if head.key}
+        for key in sorted(keys & self.replaced.keys()):
+            yield f"what is varied may have no effect: {self.replaced[key]}"
 
 
 def _point(row: Row, drawn: list[Varied]) -> str:
