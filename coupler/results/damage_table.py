@@ -27,7 +27,7 @@ COLUMNS = tuple(
         ("left_at", "s", "when it left its place; empty if it did not"),
         ("first_break", "s", "when the first of its joints broke; empty if none did"),
         ("broken", "1", "share of its joined area that is broken; empty without joints"),
-        ("pressure", "Pa", "largest mean net pressure of the water across it while it was in its place"),
+        ("pressure", "Pa", "largest net pressure of the water across wall, floor or sides, while in place"),
         ("pressure_time", "s", "when that was; empty if no water pressed"),
     )
 )

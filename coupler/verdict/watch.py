@@ -14,6 +14,7 @@ import numpy as np
 from array_types import Array, Floats
 from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions
+from coupler.verdict.pressed import Pressed
 
 if TYPE_CHECKING:
     from coupler.step.coupled_step import CoupledStepper
@@ -53,12 +54,10 @@ class Peaks:
 @dataclass(frozen=True)
 class Facts:
     """Data of the blocks at the start, fixed solids included, one row each: centre (n, 3) [m] · thickness (n,) [m] ·
-    across (n, 3): unit normal of the widest pair of faces · area (n,) [m²] that it stands for · radius (n,) [m]"""
+    radius (n,) [m] · lower, upper (n, 3) [m]: their extents"""
 
     centre: Floats
     thickness: Floats
-    across: Floats
-    area: Floats
     radius: Floats
     lower: Floats = field(repr=False)
     upper: Floats = field(repr=False)
@@ -67,15 +66,9 @@ class Facts:
     def of(cls, blocks: list[Block]) -> Facts:
         """blocks: yade_scripts Block."""
         world = [block.world_vertices() for block in blocks]
-        normals, offsets = zip(*(block.planes for block in blocks))
-        thin = [int(np.argmin(d)) for d in offsets]
-        thickness = 2.0 * np.array([d[k] for d, k in zip(offsets, thin)])
-        across = np.array([block.rotation @ n[k] for block, n, k in zip(blocks, normals, thin)])
         return cls(
             centre=np.array([block.centre for block in blocks]),
-            thickness=thickness,
-            across=across,
-            area=np.array([block.volume for block in blocks]) / thickness,
+            thickness=2.0 * np.array([block.planes[1].min() for block in blocks]),
             radius=np.array([np.linalg.norm(x - b.centre, axis=1).max() for x, b in zip(world, blocks)]),
             lower=np.array([x.min(axis=0) for x in world]),
             upper=np.array([x.max(axis=0) for x in world]),
@@ -97,6 +90,7 @@ class Watch:
         self.divisions, self.rules, self.judged = divisions, rules, np.asarray(judged, bool)
         n, bodies = structure.n, len(divisions.bodies.names)
         self.facts = Facts.of(structure.blocks)
+        self._pressed = Pressed.of(structure.blocks, divisions.members.label)
         self.foot = self._feet()
         self.moved = np.zeros(n)
         self.left_at = np.full(n, np.nan)
@@ -141,8 +135,7 @@ class Watch:
         its way, however little the water tilts it."""
         n = coupling.structure.n
         load, centre = record.load[:n], self.facts.centre[:n]
-        across = np.abs(np.einsum("ni,ni->n", load[:, :3], self.facts.across)) / self.facts.area
-        self.pressure.take(np.where(in_place, across, 0.0), record.time)
+        self.pressure.take(np.where(in_place, self._pressed.pressure(load[:, :3]), 0.0), record.time)
         label = self.divisions.bodies.label
         of_body = np.array([label == k for k in range(len(self.divisions.bodies.names))] + [self.judged])
         force = of_body @ load[:, :3]
