@@ -7,6 +7,7 @@ import numpy as np
 
 from array_types import Array
 from coupler.results.history import Column, write_table
+from coupler.verdict.attitude import shift_of, tilt_of
 from coupler.verdict.judge import joints_of
 from coupler.verdict.watch import Watch
 
@@ -24,6 +25,10 @@ COLUMNS = tuple(
         ("mass", "kg", "its mass"),
         ("thickness", "m", "smallest width across a face"),
         ("moved", "m", "how far its centre has been from its start, the farthest so far"),
+        ("shift_x", "m", "displacement of its centre as of the last output"),
+        ("shift_y", "m", "displacement of its centre as of the last output"),
+        ("shift_z", "m", "displacement of its centre as of the last output, upwards"),
+        ("tilt", "rad", "angle of its upright axis with the vertical, then"),
         ("left_at", "s", "when it left its place; empty if it did not"),
         ("first_break", "s", "when the first of its joints broke; empty if none did"),
         ("broken", "1", "share of its joined area that is broken; empty without joints"),
@@ -48,7 +53,8 @@ def write_blocks(path, structure, watch: Watch) -> None:
         COLUMNS,
         [
             rows, list(d.blocks), words(d.bodies), words(d.members), words(d.storeys), *f.centre[rows].T,
-            structure.mass[rows], f.thickness[rows], watch.moved[rows], watch.left_at[rows], first[rows], broken[rows],
+            structure.mass[rows], f.thickness[rows], watch.moved[rows],
+            *shift_of(structure)[rows].T, tilt_of(structure)[rows], watch.left_at[rows], first[rows], broken[rows],
             watch.pressure.value[rows], watch.pressure.time[rows],
         ],
     )  # fmt: skip

@@ -106,12 +106,17 @@ class _Gone(_Part):
     block: Text
     way: Number
     left_at: Number
+    shift: list[Number] | None = None
+    tilt: Number | None = None
 
 
 class _Displaced(_Part):
     blocks: Whole
     back: Whole | None = None
     rocking: Whole | None = None
+    upright: Whole | None = None
+    leaning: Whole | None = None
+    overturned: Whole | None = None
     first: Number | None
     list: list[_Gone]
 

@@ -4,6 +4,7 @@ damage         shares of joints and weight of a group, and the state they make
 divisions      bodies, walls and storeys of a structure
 pressed        the faces across which the pressure of the water on a block is measured
 depths         the depth of the water beside a structure
+attitude       displacement and tilt of blocks at the end
 rocking        blocks out of their place that their weight turns back
 watch          what is followed from step to step
 judge          the verdict

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from array_types import Array
+from coupler.verdict.attitude import OVER, UPRIGHT, shift_of, tilt_of
 from coupler.verdict.damage import Blocks, Damage, Joints, damage
 from coupler.verdict.divisions import Division
 from coupler.verdict.rocking import rocking
@@ -144,17 +145,29 @@ def _peak(peaks: Peaks, k: int) -> dict | None:
 
 
 def _displaced(structure: Structure, watch: Watch, away: Array, rocks: Array) -> dict:
-    """Blocks that left their place, those that went farthest first; how many of them came back, and how many rock."""
+    """Blocks that left their place, those that went farthest first; how many of them came back, and how many rock; how
+    many are upright, lean and have overturned at the end."""
     gone = np.flatnonzero(~np.isnan(watch.left_at) & watch.judged)
     order = gone[np.argsort(-watch.moved[gone], kind="stable")]
+    shift, tilt = shift_of(structure), tilt_of(structure)
     reported = [
-        {"block": structure.names[i], "way": float(watch.moved[i]), "left_at": float(watch.left_at[i])}
+        {
+            "block": structure.names[i],
+            "way": float(watch.moved[i]),
+            "left_at": float(watch.left_at[i]),
+            "shift": shift[i].tolist(),
+            "tilt": float(tilt[i]),
+        }
         for i in order[:MOST_LISTED]
     ]
+    over, upright = tilt[gone] > OVER, tilt[gone] <= UPRIGHT
     return {
         "blocks": len(gone),
         "back": int((~away[gone]).sum()),
         "rocking": int(rocks[gone].sum()),
+        "upright": int(upright.sum()),
+        "leaning": int((~upright & ~over).sum()),
+        "overturned": int(over.sum()),
         "first": float(watch.left_at[gone].min()) if len(gone) else None,
         "list": reported,
     }

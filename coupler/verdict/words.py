@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from coupler.program.quantities import length, moment_of, quantity
@@ -136,7 +137,9 @@ def _displaced(reported: dict) -> Iterator[str]:
     yield (
         f"{found['blocks']} of {reported['blocks']} blocks left {whose} place, the first at t = "
         f"{moment_of(found['first'])}; the farthest is {farthest['block']}, by {length(farthest['way'])}"
+        + (f" (at the end {attitude(farthest)})" if farthest.get("shift") else "")
     )
+    yield from _attitudes(found)
     if found.get("back"):
         yield f"{found['back']} of these {'is' if found['back'] == 1 else 'are'} back in place"
     if found.get("rocking"):
@@ -145,6 +148,35 @@ def _displaced(reported: dict) -> Iterator[str]:
             "to tilts about an edge in its place, and its centre of mass is not beyond that; raise time.end to see "
             "whether it comes back"
         )
+
+
+def attitude(block: dict) -> str:
+    """6.93 m sideways, 5 mm down, tilted by 3 degrees"""
+    x, y, z = block["shift"]
+    level = f"{length(math.hypot(x, y))} sideways"
+    upright = f", {length(abs(z))} {'up' if z > 0.0 else 'down'}" if abs(z) >= 0.01 * math.hypot(x, y) else ""
+    return f"{level}{upright}, tilted by {degrees(block['tilt'])}"
+
+
+def degrees(angle: float) -> str:
+    """An angle [rad] in words: 23 degrees, 3.2 degrees"""
+    size = math.degrees(angle)
+    return f"{size:.0f} degrees" if size >= 10.0 else f"{size:.1f} degrees"
+
+
+def _attitudes(found: dict) -> Iterator[str]:
+    """Whether what left its place slid, leans or has overturned; of a single block its tilt is reported already."""
+    if found.get("upright") is None or found["blocks"] == 1:
+        return
+    if found["upright"] == found["blocks"]:
+        yield "at the end none of them leans or has overturned (all are tilted by 10 degrees at most)"
+        return
+    parts = (
+        (found["upright"], "upright (tilted by 10 degrees at most)"),
+        (found["leaning"], "leaning (by up to 45)"),
+        (found["overturned"], "overturned (by more than 45)"),
+    )
+    yield "at the end, of these: " + ", ".join(f"{number} {what}" for number, what in parts if number)
 
 
 def _hits(hits: dict) -> Iterator[str]:

@@ -19,7 +19,9 @@ TOP = [
     ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")
 ]  # the changelog has old names
 PAGES = sorted([*TOP, *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
-FIGURES = {"verdict.weight_moved", "verdict.weight_out", "verdict.largest.force.value"}
+FIGURES = {
+    "verdict.weight_moved", "verdict.weight_out", "verdict.largest.force.value", "verdict.displaced.overturned",
+}  # fmt: skip
 """Names of run.json that begin as sections of a case do; tests/coupler/test_verdict.py finds them in a verdict."""
 KNOWN = {key.path for key in keys()}
 SECTIONS = {path.split(".")[0] for path in KNOWN}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from coupler.commands.report.html import figure, note, table
 from coupler.program.quantities import length, moment_of, percent, quantity
-from coupler.verdict.words import name_of, point, sentences
+from coupler.verdict.words import attitude, name_of, point, sentences
 
 FIGURES = {
     "damage": "Share of the joined area that is broken, by wall and floor, in order of their first break",
@@ -117,9 +117,12 @@ def _joints(group: dict) -> str:
 
 def _displaced(judged: dict) -> str:
     found = judged["displaced"]
-    rows = [[b["block"], length(b["way"]), moment_of(b["left_at"])] for b in found["list"]]
+    rows = [
+        [b["block"], length(b["way"]), moment_of(b["left_at"]), attitude(b) if b.get("shift") else "–"]
+        for b in found["list"]
+    ]
     left = found["blocks"] - len(rows)
-    return table(["block that left its place", "moved by", "left at"], rows) + note(
+    return table(["block that left its place", "moved by", "left at", "at the end"], rows, (0, 3)) + note(
         f"and {left} more in blocks.csv" if left else ""
     )
 
