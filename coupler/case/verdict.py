@@ -37,6 +37,6 @@ class Verdict(Section):
     )
     hit_speed: Annotated[float, InSI("m/s", gt=0)] | None = Field(
         None,
-        description="debris hits what it loses at least this speed to within a step; absent: the speed of a fall "
-        "from a tenth of its thickness",
+        description="debris hits what it loses at least this speed to within a step, or within two that divide a "
+        "blow; absent: the speed of a fall from a tenth of its thickness",
     )

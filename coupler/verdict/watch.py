@@ -75,6 +75,32 @@ class Facts:
         )
 
 
+@dataclass(frozen=True)
+class _Blow:
+    """change (n, 3) [m/s] of the velocity of each block in a time dt [s] · impulse (n, 3) [N s] of its contacts"""
+
+    change: Floats
+    impulse: Floats
+    dt: float
+
+    @property
+    def size(self) -> Floats:
+        """(n,) [N s]"""
+        return np.linalg.norm(self.impulse, axis=1)
+
+    @property
+    def lost(self) -> Floats:
+        """(n,) [m/s] speed that each block lost against its contacts; zero without one."""
+        size = self.size
+        along = np.einsum("ni,ni->n", self.change, self.impulse)
+        return np.divide(along, size, out=np.zeros(len(size)), where=size > 0.0)
+
+    def strikes(self, mass: Array, speed: Array) -> Array:
+        """(n,) bool: blocks of these masses [kg] whose contacts took at least this speed [m/s]."""
+        size = self.size
+        return (size > 0.0) & (self.lost >= speed) & (size >= mass * speed)
+
+
 class Watch:
     """structure: yade_scripts Structure · divisions: of its blocks · rules of the verdict · judged (n,) bool: blocks
     that it is about · hit_speed [m/s] or None"""
@@ -105,6 +131,7 @@ class Watch:
         fall = np.sqrt(2.0 * g * FALL * self.facts.thickness)
         self._hit_speed = fall if hit_speed is None else np.full(n, hit_speed)
         self._hits: dict[tuple[int, int], tuple[float, ...]] = {}
+        self._blow = _Blow(np.zeros((n, 3)), np.zeros((n, 3)), 0.0)
         self._never_joined = ~joined(structure)
 
     def _feet(self) -> Array:
@@ -157,17 +184,29 @@ class Watch:
         return self.divisions.bodies.names[k], float(self._force_now[k])
 
     def _hit(self, s: Structure, record: StepRecord, velocity: Array, in_place: Array) -> None:
-        """Record debris that lost speed in a contact in this step, and the block that it hit."""
+        """Record debris that lost speed in a contact in this step, or in this and the one before together, and the
+        block that it hit."""
         if record.impulses is None:
             return
-        J = record.impulses.contact[:, :3]
-        size = np.linalg.norm(J, axis=1)
-        debris = (self._never_joined | ~in_place) & ~s.fixed & (size > 0.0)
-        lost = np.zeros(s.n)
-        lost[debris] = (
-            np.einsum("ni,ni->n", velocity[debris] - self._before[debris], J[debris]) / size[debris]
+        debris = (self._never_joined | ~in_place) & ~s.fixed
+        now = _Blow(velocity - self._before, record.impulses.contact[:, :3].copy(), record.dt)
+        before, self._blow = self._blow, now
+        struck = debris & now.strikes(s.mass, self._hit_speed)
+        self._hits_among(s, record.time, now, struck, in_place)
+        split = (
+            debris
+            & ~struck
+            & ~before.strikes(s.mass, self._hit_speed)
+            & (now.lost > 0.0)
+            & (before.lost > 0.0)
         )
-        hits = np.flatnonzero(debris & (lost >= self._hit_speed) & (size >= s.mass * self._hit_speed))
+        both = _Blow(now.change + before.change, now.impulse + before.impulse, now.dt + before.dt)
+        self._hits_among(s, record.time, both, split & both.strikes(s.mass, self._hit_speed), in_place)
+
+    def _hits_among(self, s: Structure, time: float, blow: _Blow, struck: Array, in_place: Array) -> None:
+        """Keep the hits of the blocks that struck (n,) bool something, where what they hit is found."""
+        J, size = blow.impulse, blow.size
+        hits = np.flatnonzero(struck)
         x = s.centre() if len(hits) else np.zeros((0, 3))
         for i in hits.tolist():
             near = np.linalg.norm(x - x[i], axis=1) <= self.facts.radius + self.facts.radius[i]
@@ -175,19 +214,17 @@ class Watch:
             answer[i] = 0.0
             j = int(np.argmax(answer))
             if answer[j] >= ANSWERS * size[i] and (in_place[j] or self._other_body(i, j)):
-                self._note_hit(i, j, record, float(lost[i]), float(size[i]), x[i])
+                self._note_hit(i, j, time, blow, x[i])
 
     def _other_body(self, i: int, j: int) -> bool:
         label = self.divisions.bodies.label
         return label[i] != label[j]
 
-    def _note_hit(
-        self, i: int, j: int, record: StepRecord, speed: float, impulse: float, place: Array
-    ) -> None:
+    def _note_hit(self, i: int, j: int, time: float, blow: _Blow, place: Array) -> None:
         """Keep the hit of a pair that has the largest impulse."""
-        old = self._hits.get((i, j))
+        old, lost, impulse = self._hits.get((i, j)), float(blow.lost[i]), float(blow.size[i])
         if old is None or impulse > old[4]:
-            self._hits[i, j] = (record.time, i, j, speed, impulse, impulse / record.dt, *map(float, place))
+            self._hits[i, j] = (time, i, j, lost, impulse, impulse / blow.dt, *map(float, place))
 
     @property
     def hits(self) -> Array:
@@ -215,7 +252,9 @@ class Watch:
             for part in ("value", "time")
         }
         own = {name: getattr(self, name).copy() for name in _OWN}
-        return {**peaks, **own, "before": self._before.copy(), "hits": self.hits}
+        blow = {"change": self._blow.change.copy(), "contact": self._blow.impulse.copy()}
+        blow["contact_time"] = np.array(self._blow.dt)
+        return {**peaks, **own, **blow, "before": self._before.copy(), "hits": self.hits}
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Restore the state that `save` returned."""
@@ -224,6 +263,7 @@ class Watch:
         for name in _OWN:
             setattr(self, name, saved[name].copy())
         self._before = saved["before"].copy()
+        self._blow = _Blow(saved["change"].copy(), saved["contact"].copy(), float(saved["contact_time"]))
         self._hits = {(int(row[1]), int(row[2])): tuple(row.tolist()) for row in saved["hits"]}
 
 

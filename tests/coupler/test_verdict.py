@@ -375,6 +375,51 @@ def test_debris_that_loses_its_speed_to_a_wall_has_hit_it(scene):
     assert (hit["speed"], hit["impulse"], hit["force"]) == pytest.approx((3.0, J, J / 0.01))
 
 
+@pytest.mark.parametrize("shares", [(0.5, 0.5), (0.3, 0.7), (1.0, 0.0)])
+def test_a_blow_that_the_end_of_a_step_divides_is_the_same_hit(scene, shares):
+    """The crate is stopped from 1.7 m/s, which is more than the 1.4 of a fall from a tenth of its height, wherever a
+    step ends within the blow."""
+    s, watch, coupling = scene
+    s.x[2, 0], s.v[2, 0] = 4.2, 1.7
+    watch.step(coupling, record(0.2))
+    for time, share in zip((0.21, 0.22), shares):
+        J = 500.0 * 1.7 * share
+        s.v = s.v.copy()
+        s.v[2, 0] -= 1.7 * share
+        watch.step(coupling, record(time, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
+    (hit,) = verdict(s, watch)["hits"]["list"]
+    assert (hit["block"], hit["other"]) == ("crate", "wall-0")
+    assert (hit["speed"], hit["impulse"]) == pytest.approx((1.7, 500.0 * 1.7))
+
+
+def test_a_slow_stop_over_many_steps_is_no_hit(scene):
+    s, watch, coupling = scene
+    s.x[2, 0], s.v[2, 0] = 4.2, 1.7
+    J = 500.0 * 0.17
+    for k in range(10):
+        s.v = s.v.copy()
+        s.v[2, 0] -= 0.17
+        watch.step(coupling, record(0.2 + 0.01 * k, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
+    assert verdict(s, watch)["hits"]["pairs"] == 0
+
+
+def test_a_blow_goes_on_after_a_restart(scene):
+    s, watch, coupling = scene
+    s.x[2, 0], s.v[2, 0] = 4.2, 1.7
+    watch.step(coupling, record(0.2))
+    J = 500.0 * 0.85
+    saved = None
+    for time in (0.21, 0.22):
+        if saved is not None:
+            watch.restore(saved)
+        s.v = s.v.copy()
+        s.v[2, 0] -= 0.85
+        watch.step(coupling, record(time, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
+        saved = watch.save()
+        watch._blow = None
+    assert verdict(s, watch)["hits"]["pairs"] == 1
+
+
 def test_what_the_water_stops_has_hit_nothing(scene):
     """It lost the speed, but no contact took it: only its own weight on the ground."""
     W = 500.0 * G * 0.01
