@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     import pandas
 
 
+TABLES = ("blocks", "buildings", "cracks")
+"""Tables beside the histories: a row for each block, building and joint."""
+
+
 class NotDrawn(SurgebreakError):
     """The process that makes pictures or the report did not end well."""
 
@@ -138,14 +142,17 @@ class Run:
 
     def history(self, name: str) -> History:
         """A history table by its name: `run.history("water")["volume"]` (rows,), NaN where a cell is empty; `columns`
-        gives
-        units and meanings. Raises UnknownName, BadTable."""
-        if name not in self.histories:
-            known = self.histories
+        gives units and meanings. Also "blocks", "buildings" and "cracks", with a row for each of them as of the last
+        stored time, where the run has them. Raises UnknownName, BadTable."""
+        known = {path.stem: path for path in (self.directory / "history").glob("*.csv")}
+        known |= {path.stem: path for path in (self.directory / f"{n}.csv" for n in TABLES) if path.exists()}
+        if name not in known:
+            near = did_you_mean(name, known) or "."
+            why = " (it has no joints)" if name == "cracks" else ""
             raise UnknownName(
-                f"{name}: {self.directory} has no such history{did_you_mean(name, known)} It has {', '.join(known)}"
+                f"{name}: {self.directory} has no such table{why}{near} It has {', '.join(sorted(known))}"
             )
-        return read_history(self.directory / "history" / f"{name}.csv")
+        return read_history(known[name])
 
     def frame(self, name: str) -> pandas.DataFrame:
         """The same as a pandas table (the extra `pandas`); `attrs["units"]` gives the unit of each column."""
@@ -156,8 +163,8 @@ class Run:
         """One row per joint at the last stored time: its blocks, its position, the time of its failure, its dissipated
         energy.
 
-        Raises BadTable for a run without joints."""
-        return read_history(self.directory / "cracks.csv")
+        Raises UnknownName for a run without joints."""
+        return self.history("cracks")
 
     def cracks_frame(self) -> pandas.DataFrame:
         """The same as a pandas table."""

@@ -37,6 +37,7 @@ def run(
 
     file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
     if dry:
+        print(f"{file.path}: {file.case.case.title}: no mistake found; nothing was run")
         return
     from coupler.run.directory import RunDirectory
     from coupler.run.execute import execute_case

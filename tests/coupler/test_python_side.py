@@ -1,5 +1,6 @@
 """`import surgebreak`: a case run by a script is what the command makes of it, and what is read back is what ran."""
 
+import shutil
 import subprocess
 import sys
 
@@ -8,6 +9,7 @@ import pytest
 
 import surgebreak
 from coupler.case.first_cases import text_of
+from coupler.program.errors import UnknownName
 from coupler.program.provenance import ROOT
 from coupler.results.history import read_history
 
@@ -146,6 +148,22 @@ def test_the_callback_sees_what_the_histories_keep(ran):
     assert [step.dt for step in seen] == pytest.approx(np.diff(times, prepend=0.0), rel=1e-12)
     assert [step.joints_broken for step in seen][-1] == run.figures["joints_broken"] > 0
     assert sum(step.substeps for step in seen) == run.figures["substeps"]
+
+
+def test_the_tables_of_blocks_and_cracks_are_read_as_histories_are(ran, tmp_path):
+    run, _ = ran
+    assert list(run.history("blocks")["name"]) == list(run.blocks().names)
+    assert len(run.history("cracks")["joint"]) == len(run.cracks["joint"]) == run.figures["joints"]
+    with pytest.raises(
+        UnknownName, match=r"no such table; did you mean 'blocks'\? It has angular_momentum, "
+    ):
+        run.history("block")
+    with pytest.raises(UnknownName, match=r"no such table\. It has "):
+        run.history("buildings")
+    bare = shutil.copytree(run.directory, tmp_path / "bare")
+    (bare / "cracks.csv").unlink()
+    with pytest.raises(UnknownName, match=r"it has no joints"):
+        _ = surgebreak.open(bare).cracks
 
 
 def test_a_second_run_in_a_process_gives_the_same_bytes(ran, tmp_path):

@@ -83,6 +83,7 @@ def test_any_other_text_is_refused_with_words_and_never_crashes(text):
         ("4", "s", "has no unit"),
         ("4 furlong/fortnigt", "m/s", "unknown unit"),
         ("3 m)", "m", "unknown unit"),
+        ("6,5 s", "s", "a decimal point is needed: '6.5 s'"),
         ("3 kpa", "Pa", "did you mean 'kPa'?"),
         ("3 mn/M", "N/m", "did you mean 'MN/m'?"),
         ("0.1 MPas", "Pa", "unknown unit 'MPas'; did you mean 'MPa'?"),
