@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupler.commands.view import palette
-from coupler.commands.view.camera import SIDES, VIEWS, frame, side_of
+from coupler.commands.view.camera import SIDES, VIEWS, angle_of, frame, side_of
 
 MARGIN = (0.04, 0.1, 0.17, 0.05)
 
@@ -72,3 +72,24 @@ def test_a_plan_has_x_to_the_right_and_y_upwards():
     np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-9)
     assert camera.position[2] > 1.0
     np.testing.assert_allclose(camera.position[:2], [2, 1], atol=1e-6)
+
+
+@pytest.mark.parametrize("view", VIEWS.values())
+def test_a_view_by_name_has_one_scale_at_every_depth(view):
+    """Else the scale bar of a plan holds for the ground alone, and roofs are drawn larger and over what stands beside
+    them. Ends of the near and of the far side of the box lie apart by the same share of the picture within 2 %."""
+    lower, upper = np.zeros(3), np.array([4.0, 2.0, 1.0])
+    camera = frame(lower, upper, 1.5, *view, angle_of(*view))
+    back = camera.position - camera.focus
+    deep = int(np.argmax(np.abs(back)))
+    widths = []
+    for depth in (lower[deep], upper[deep]):
+        ends = np.array([lower, upper])
+        ends[:, deep] = depth
+        widths.append(np.abs(np.diff(on_picture(camera, ends, 1.5), axis=0)).max())
+    height = np.linalg.norm(back) * 2 * np.tan(np.radians(camera.view_angle) / 2)
+    assert abs(widths[0] / widths[1] - 1.0) < 0.02 * max(1.0, (upper - lower)[deep] / height)
+
+
+def test_other_directions_keep_their_perspective():
+    assert angle_of(-65.0, 24.0) > 20.0

@@ -11,6 +11,9 @@ VIEWS = {
     "plan": (-90.0, 90.0), "south": (-90.0, 0.0), "east": (0.0, 0.0), "north": (90.0, 0.0), "west": (180.0, 0.0),
 }  # fmt: skip
 """Azimuth and elevation [degree] of a view by name: from above, and from the side at y-, x+, y+ and x-."""
+WIDE, FAR = 24.0, 1.0
+"""View angles [degree]: of a picture, and that which frames a view by name. Such a view is drawn without perspective,
+so that one scale holds at every depth."""
 SIDES = (-62.0, -118.0, 118.0, 62.0)
 """Azimuths [degree] of which `side_of` takes one."""
 
@@ -23,6 +26,11 @@ def side_of(where, usual=SIDES[0]):
     turns = np.radians(SIDES)
     facing = np.cos(turns) * where[0] / size + np.sin(turns) * where[1] / size
     return SIDES[int(np.flatnonzero(facing >= facing.max() - 1e-3)[0])]
+
+
+def angle_of(azimuth, elevation):
+    """View angle [degree] of a picture in a direction [degree]: FAR in that of a view by name."""
+    return FAR if (azimuth, elevation) in VIEWS.values() else WIDE
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,7 @@ def direction(azimuth, elevation):
 
 
 def frame(
-    lower, upper, aspect, azimuth=-65.0, elevation=24.0, view_angle=24.0, margin=(0.05, 0.05, 0.05, 0.05)
+    lower, upper, aspect, azimuth=-65.0, elevation=24.0, view_angle=WIDE, margin=(0.05, 0.05, 0.05, 0.05)
 ):
     """The nearest camera in the given direction that sees all corners of the box [lower, upper] (3,) [m].
 

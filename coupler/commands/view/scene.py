@@ -12,7 +12,7 @@ import pyvista as pv
 from matplotlib.colors import ListedColormap
 
 from coupler.commands.view import palette
-from coupler.commands.view.camera import frame, side_of
+from coupler.commands.view.camera import FAR, angle_of, frame, side_of
 from coupler.commands.view.captions import caption_of, north_of, where_it_happens
 from coupler.commands.view.foam import foam
 from coupler.commands.view.scales import bounds, corners, decimals, fastest_and_air, nice_floor
@@ -133,17 +133,26 @@ class Scene:
         self.plotter.add_light(pv.Light(light_type="headlight", intensity=headlight))
 
     def _set_camera(self, azimuth, elevation, eye):
+        angle = angle_of(azimuth, elevation)
+        below = 0.055 if angle == FAR else 0.0  # the label of the scale bar
         view = eye or frame(
             self.lower,
             self.upper,
             self.size[0] / self.size[1],
             azimuth,
             elevation,
-            margin=(0.04, 0.04, 0.095 + BAR * self.letters, 0.05),
+            angle,
+            margin=(0.04, 0.04, 0.095 + below + BAR * self.letters, 0.05),
         )
         camera = self.plotter.camera
         camera.position, camera.focal_point, camera.up = view.position, view.focus, view.up
         camera.view_angle = view.view_angle
+        if view.view_angle == FAR:  # a parallel projection, from near: depths of shadows have half precision
+            away = view.position - view.focus
+            distance = np.linalg.norm(away)
+            camera.parallel_projection = True
+            camera.parallel_scale = distance * np.tan(np.radians(FAR) / 2)
+            camera.position = view.focus + away / distance * 2.0 * np.linalg.norm(self.upper - self.lower)
 
     def _smooth(self, soft):
         """Smooth edges (2 x 2 samples per pixel), and add screen-space ambient occlusion for depth; or neither."""
