@@ -30,8 +30,9 @@ COLUMNS = tuple(
         ("weight_moved", "1", "share of its weight that left its place"),
         ("first_break", "s", "when the first joint broke; empty if none did"),
         ("walls", "", "walls and floors with broken joints, the first to break first: name broken/joints"),
-        ("force", "N", "largest force of the water"),
+        ("force", "N", "largest force of the water, uplift included"),
         ("force_time", "s", "when that was"),
+        ("horizontal_force", "N", "largest horizontal force of the water"),
         ("impulse_x", "N s", "force of the water added up over the run"),
         ("impulse_y", "N s", "force of the water added up over the run"),
         ("moment", "N m", "largest overturning moment of the water about the middle of its base"),
@@ -55,14 +56,14 @@ def write_buildings(path, structure, watch: Watch, maps: Maps) -> None:
 def _row(body: dict, members: list[dict], watch: Watch, maps: Maps) -> tuple:
     k = watch.divisions.bodies.names.index(body["name"])
     largest, first = body["largest"], body["first_break"]
-    force, moment = largest["force"] or {}, largest["moment"] or {}
+    force, push, moment = (largest[name] or {} for name in ("force", "horizontal", "moment"))
     flood = _around(maps, watch, watch.divisions.bodies.rows(k))
     walls = _walls(body["name"], members, watch.divisions.members_of(k))
     nan = float("nan")
     return (
         body["name"], *watch.foot[k].tolist(), body["state"], body["joints"], body["joints_broken"],
         body["joints_torn"], body["area_broken"], body["weight_moved"], first["time"] if first else nan, walls,
-        force.get("value", 0.0), force.get("time", nan), *watch.impulse[k, :2].tolist(), moment.get("value", 0.0),
+        force.get("value", 0.0), force.get("time", nan), push.get("value", 0.0), *watch.impulse[k, :2].tolist(), moment.get("value", 0.0),
         moment.get("time", nan), *flood,
     )  # fmt: skip
 

@@ -32,7 +32,15 @@ UNSET = (
     "structure/joints/failure_time",
     *(
         f"recorder/watch_{name}"
-        for name in ("left_at", "pressure_time", "force_time", "moment_time", "depth_time", "depth_at")
+        for name in (
+            "left_at",
+            "pressure_time",
+            "force_time",
+            "push_time",
+            "moment_time",
+            "depth_time",
+            "depth_at",
+        )
     ),
 )
 """Arrays in which NaN has a meaning."""

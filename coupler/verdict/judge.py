@@ -122,8 +122,9 @@ def _add_loads(bodies: list[dict], watch: Watch) -> None:
 
 
 def _largest(watch: Watch, k: int, judged: bool = False) -> dict:
-    """Largest force and overturning moment of the water, and depth beside it; None for values that never occurred."""
-    force, moment = _peak(watch.force, k), _peak(watch.moment, k)
+    """Largest force, horizontal force and overturning moment of the water, and depth beside it; None for values that
+    never occurred."""
+    force, push, moment = (_peak(peaks, k) for peaks in (watch.force, watch.push, watch.moment))
     if force:
         force["direction"] = watch.direction[k].tolist()
     if moment:
@@ -135,7 +136,7 @@ def _largest(watch: Watch, k: int, judged: bool = False) -> dict:
     depth = _peak(watch.depth, k) if len(watch.depth.value) else None
     if depth:
         depth["place"] = watch.depth_at[k].tolist()
-    return {"force": force, "moment": moment, "depth": depth}
+    return {"force": force, "horizontal": push, "moment": moment, "depth": depth}
 
 
 def _peak(peaks: Peaks, k: int) -> dict | None:

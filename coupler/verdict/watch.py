@@ -121,7 +121,7 @@ class Watch:
         self.moved = np.zeros(n)
         self.left_at = np.full(n, np.nan)
         self.pressure = Peaks.none(n)
-        self.force, self.moment = Peaks.none(bodies + 1), Peaks.none(bodies + 1)
+        self.force, self.push, self.moment = (Peaks.none(bodies + 1) for _ in range(3))
         self._force_now: Array | None = None
         self.direction, self.impulse = np.zeros((bodies + 1, 3)), np.zeros((bodies + 1, 3))
         self.depth = Peaks.none(bodies)
@@ -170,6 +170,7 @@ class Watch:
         self._force_now = np.linalg.norm(force, axis=1)
         larger = self.force.take(self._force_now, record.time)
         self.direction[larger] = force[larger]
+        self.push.take(np.linalg.norm(force[:, :2], axis=1), record.time)
         about_zero = of_body @ (load[:, 3:] + np.cross(centre, load[:, :3]))
         overturning = about_zero - np.cross(self.foot, force)
         self.moment.take(np.linalg.norm(overturning[:, :2], axis=1), record.time)
@@ -248,7 +249,7 @@ class Watch:
         """Copies of the quantities so far."""
         peaks = {
             f"{name}_{part}": getattr(getattr(self, name), part).copy()
-            for name in ("pressure", "force", "moment", "depth")
+            for name in _PEAKS
             for part in ("value", "time")
         }
         own = {name: getattr(self, name).copy() for name in _OWN}
@@ -258,7 +259,7 @@ class Watch:
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Restore the state that `save` returned."""
-        for name in ("pressure", "force", "moment", "depth"):
+        for name in _PEAKS:
             setattr(self, name, Peaks(saved[f"{name}_value"].copy(), saved[f"{name}_time"].copy()))
         for name in _OWN:
             setattr(self, name, saved[name].copy())
@@ -267,6 +268,7 @@ class Watch:
         self._hits = {(int(row[1]), int(row[2])): tuple(row.tolist()) for row in saved["hits"]}
 
 
+_PEAKS = ("pressure", "force", "push", "moment", "depth")
 _OWN = ("moved", "left_at", "direction", "impulse", "depth_at")
 
 

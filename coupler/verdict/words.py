@@ -110,10 +110,12 @@ def _order(reported: dict) -> Iterator[str]:
 
 
 def _loads(largest: dict) -> Iterator[str]:
-    force, moment, depth = (largest[name] for name in ("force", "moment", "depth"))
+    force, push, moment, depth = (largest.get(name) for name in ("force", "horizontal", "moment", "depth"))
     parts = []
     if force:
-        parts.append(f"force of the water {at(force, 'N')}")
+        parts.append(f"force of the water {at(force, 'N')} with its uplift")
+    if push:
+        parts.append(f"horizontally {at(push, 'N')}")
     if moment:
         parts.append(f"overturning moment about the middle of its base {at(moment, 'N m')}")
     if depth:

@@ -174,18 +174,21 @@ def test_a_base_that_gapes_is_said_to_hold_by_a_part_of_its_face(scene):
 
 
 def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(scene):
-    """100 kN at half the height of the upper block: 1.5 m above the foot, so 150 kN m."""
+    """100 kN at half the height of the upper block: 1.5 m above the foot, so 150 kN m. Half of it with an uplift of 90 kN
+    is the larger force, and the smaller horizontal one."""
     s, watch, coupling = scene
-    push = np.zeros((3, 3))
+    push, lift = np.zeros((3, 3)), np.zeros((3, 3))
     push[1, 0] = 1e5
+    lift[1, 2] = 9e4
     watch.step(coupling, record(0.5, load=push))
-    watch.step(coupling, record(0.6, load=0.5 * push))
+    watch.step(coupling, record(0.6, load=0.5 * push + lift))
     largest = verdict(s, watch)["largest"]
-    assert (largest["force"]["value"], largest["force"]["time"]) == pytest.approx((1e5, 0.5))
+    assert (largest["force"]["value"], largest["force"]["time"]) == pytest.approx((np.hypot(5e4, 9e4), 0.6))
+    assert (largest["horizontal"]["value"], largest["horizontal"]["time"]) == pytest.approx((1e5, 0.5))
     assert largest["moment"]["value"] == pytest.approx(1.5e5)
     assert largest["moment"]["about"] == pytest.approx([5.0, 0.0, 0.0])
     assert watch.pressure.value[1] == pytest.approx(1e5)  # over a face of 1 m2
-    assert watch.impulse[0] == pytest.approx([1.5e3, 0.0, 0.0])  # 10 ms of the whole and of half
+    assert watch.impulse[0] == pytest.approx([1.5e3, 0.0, 900.0])  # 10 ms of the whole and of half
     for name in FIGURES:
         found = {"verdict": verdict(s, watch)}
         for part in name.split("."):
@@ -507,6 +510,7 @@ def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
         divisions=SimpleNamespace(bodies=SimpleNamespace(label=np.array([0, 0, 1, -1, 2]))),
         judged=np.array([True, True, True, True, False]),
         force=Peaks(np.array([1.0, 2.0, 3.0, 7.0]), np.array([0.1, 0.2, 0.3, 0.7])),
+        push=Peaks(np.array([1.0, 2.0, 3.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.6])),
         moment=Peaks(np.array([4.0, 5.0, 0.0, 8.0]), np.array([0.4, 0.5, np.nan, 0.8])),
         direction=np.arange(12.0).reshape(4, 3),
         foot=-np.arange(12.0).reshape(4, 3),
@@ -515,11 +519,13 @@ def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
     )
     assert _largest(watch, 3, judged=True) == {
         "force": {"value": 7.0, "time": 0.7, "direction": [9.0, 10.0, 11.0]},
+        "horizontal": {"value": 6.0, "time": 0.6},
         "moment": {"value": 8.0, "time": 0.8, "about": [-9.0, -10.0, -11.0]},
         "depth": {"value": 0.9, "time": 2.0, "place": [2.0, 3.0]},
     }
     assert _largest(watch, 2) == {
         "force": {"value": 3.0, "time": 0.3, "direction": [6.0, 7.0, 8.0]},
+        "horizontal": {"value": 3.0, "time": 0.3},
         "moment": None,
         "depth": {"value": 1.5, "time": 3.0, "place": [4.0, 5.0]},
     }
