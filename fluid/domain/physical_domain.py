@@ -351,8 +351,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
     keep, several = np.ones(len(parent), bool), np.zeros(len(parent_node), bool)
     if covers == "multiple":
         several = np.bincount(parent_node)[parent_node] > 1
-        least = memory.connection.pocket * mesh.local_size[elements.parent] ** 3
-        keep = without_pockets(cells, volume, len(parent_node), least)
+        keep = without_pockets(cells, volume, len(parent_node), _least_pocket(memory, elements))
     if not keep.all():
         used, renumbered, cells = _compressed(cells, keep, len(parent_node))
         parent_node, several = parent_node[used], several[used]
@@ -384,6 +383,15 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         covers=covers,
         memory=memory,
     )
+
+
+def _least_pocket(memory, elements):
+    """Volume [m³] below which a component of the water is dropped: of each element (M,), or one where all cells have
+    the same size."""
+    size = memory.mesh.local_size
+    if size.strides == (0,):
+        return memory.connection.pocket * size[:1] ** 3
+    return memory.connection.pocket * size[elements.parent] ** 3
 
 
 def _volume(memory, elements):
