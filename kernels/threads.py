@@ -107,15 +107,19 @@ def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int | N
     kernel: `ranged` or `released`, or Python code · weight: cost of a row, in usual rows, which take some ten
     nanoseconds · pieces: number of ranges for each thread, more than one for rows of unequal cost; None: PIECES where
     each range has enough rows, one for Python code."""
-    if _settings.size == 1 and _settings.calls is None:
+    size, least = _settings.size, _settings.least
+    if size == 1 and _settings.calls is None:
         return [kernel(0, count, *args)]
     shared = is_shared(kernel)
-    parts = min(_parts(count * weight if shared else count * weight / PYTHON), max(count, 1))
-    if parts == 1:
-        return [_alone(kernel, count * weight, (0, count, *args))]
+    rows = count * weight if shared else count * weight / PYTHON
+    if count < 2 or rows < 2 * least:
+        return [kernel(0, count, *args)]
+    if size == 1:
+        return [_alone(kernel, rows, (0, count, *args))]
+    parts = min(size, MOST, count, int(rows) // least)
     if shared:
         if pieces is None:
-            pieces = max(1, min(PIECES, int(count * weight) // (parts * _settings.least)))
+            pieces = min(PIECES, int(rows) // (parts * least))
         found = _team.share(kernel, parts, min(parts * pieces, count, MOST), count, args)
         return [kernel(0, count, *args)] if found is None else found
     ends = [count * k // parts for k in range(parts + 1)]
