@@ -63,8 +63,8 @@ def _row(body: dict, members: list[dict], watch: Watch, maps: Maps) -> tuple:
     return (
         body["name"], *watch.foot[k].tolist(), body["state"], body["joints"], body["joints_broken"],
         body["joints_torn"], body["area_broken"], body["weight_moved"], first["time"] if first else nan, walls,
-        force.get("value", 0.0), force.get("time", nan), push.get("value", 0.0), *watch.impulse[k, :2].tolist(), moment.get("value", 0.0),
-        moment.get("time", nan), *flood,
+        force.get("value", 0.0), force.get("time", nan), push.get("value", 0.0),
+        *watch.impulse[k, :2].tolist(), moment.get("value", 0.0), moment.get("time", nan), *flood,
     )  # fmt: skip
 
 

@@ -174,8 +174,8 @@ def test_a_base_that_gapes_is_said_to_hold_by_a_part_of_its_face(scene):
 
 
 def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(scene):
-    """100 kN at half the height of the upper block: 1.5 m above the foot, so 150 kN m. Half of it with an uplift of 90 kN
-    is the larger force, and the smaller horizontal one."""
+    """100 kN at half the height of the upper block: 1.5 m above the foot, so 150 kN m. Half of it with an uplift of
+    90 kN is the larger force, and the smaller horizontal one."""
     s, watch, coupling = scene
     push, lift = np.zeros((3, 3)), np.zeros((3, 3))
     push[1, 0] = 1e5
