@@ -26,6 +26,7 @@ from fluid.pressure.projection import (
     nodal_mean,
     with_ghosts,
 )
+from fluid.step import speeds
 from fluid.step.momentum import Stages, holding_water, momentum_change
 from fluid.step.remainders import LAYER, MEMORY_DEPTH, left_in_cells
 from fluid.step.report import StepReport
@@ -97,7 +98,7 @@ def corrected(water, problem, x, parting) -> Corrected:
     u, a, forced, mean = _projected(t, kept, gradient, dt)
     remainder, kick_remainder = left_in_cells(water, kept, gradient, mean, u, dt)
     held, projected_energy = holding_water(water, kept), kinetic_energy(problem.density, kept.nodal_water, u)
-    projected, calm = copied_at(held, u), water.calm(kept.end - water.time, kept.crossing)
+    projected, calm = copied_at(held, u), speeds.calm(water, kept.end - water.time, kept.crossing)
     clipped, limited, damped = _limit_and_damp(water, kept, u, a, held, projected, calm)
     slipping = copied_at(held, u)
     listed, start = water.layers(kept.wet)
@@ -234,8 +235,8 @@ def _share_at_rest(water, u):
 
 
 def _limit_speed(water, u, a) -> int:
-    """Limit |u| to `Water.speed_cap`, in place; clipped nodes continue in free fall."""
-    return sum(over(_clip, len(u), u, a, water.speed_cap(), water.parameters.weight))
+    """Limit |u| to `speeds.speed_cap`, in place; clipped nodes continue in free fall."""
+    return sum(over(_clip, len(u), u, a, speeds.speed_cap(water), water.parameters.weight))
 
 
 @ranged

@@ -32,6 +32,7 @@ from fluid.pressure.projection import (
 )
 from fluid.pressure.waterline import WaterlineLoad
 from fluid.sides.outflow import Outflow
+from fluid.step import speeds
 from fluid.step.carried import carried_by_fluxes
 from fluid.step.kick import kicked
 from fluid.step.remainders import carried_remainder
@@ -121,8 +122,8 @@ class Moved:
 
 def predicted(water, dt: float) -> PressureProblem:
     """Carry out the step up to the pressure solve; reads the state of `water`."""
-    crossing, parameters = water.crossing(), water.parameters
-    theta, kick = water.theta(dt, crossing), water.kick_factor(crossing)
+    crossing, parameters = speeds.crossing(water), water.parameters
+    theta, kick = speeds.theta(water, dt, crossing), water.kick_factor(crossing)
     u_adv, phi = _transported(water, dt, theta, kick)
     found = carried_by_fluxes(water, dt, theta, kick)
     carried = copied(found.water) if is_nothing(found.swept) else added(found.water, found.swept)
@@ -157,11 +158,11 @@ def predicted(water, dt: float) -> PressureProblem:
         carried[filled] = water.topology.node_volume[filled]
         in_films = water.in_films(phi)
     beside = total(displaced) + in_films[0]
-    calm = water.calm(dt, crossing)
+    calm = speeds.calm(water, dt, crossing)
     held = added(carried, displaced)
     phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, water.on_one_side)
     surface = _new_surface(
-        water, calm, share_of_fast(water.in_waves(crossing)), phi, held, conserved + beside
+        water, calm, share_of_fast(speeds.in_waves(water, crossing)), phi, held, conserved + beside
     )
     in_jumps = None
     if found.velocity is not None:

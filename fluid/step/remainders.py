@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.domain.cell_vectors import CellVectors, first_from
+from fluid.step import speeds
 from kernels.decorators import inner, ranged
 from kernels.threads import over
 
@@ -144,9 +145,9 @@ def kept_near_the_surface(water, theta: float, crossing: float, dt: float) -> fl
     In steady flow, pressure and divergence of u are coupled by τ = θ dt in cells that keep nothing, and by τ = T + θ dt
     in those that keep the share T/(T + dt). With T = θ_1 dt_1 - θ dt, where dt_1 is the step at Courant number 1 and
     θ_1 its θ, τ does not depend on the step; T = 0 in this step and longer ones. With τ = θ dt alone the pressure has
-    wiggles beside free edges, the more, the shorter the step. crossing: as in `Water.calm`."""
-    at_courant_1 = min(water.longest_step(), water.mesh.spacing / max(crossing, 1e-12))
+    wiggles beside free edges, the more, the shorter the step. crossing: `speeds.crossing`."""
+    at_courant_1 = min(speeds.longest_step(water), water.mesh.spacing / max(crossing, 1e-12))
     if dt > (1.0 - ROUND_OFF) * at_courant_1:
         return 0.0
-    longer = max(water.theta(at_courant_1, crossing) * at_courant_1 - theta * dt, 0.0)
+    longer = max(speeds.theta(water, at_courant_1, crossing) * at_courant_1 - theta * dt, 0.0)
     return longer / (longer + dt)

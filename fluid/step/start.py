@@ -66,7 +66,7 @@ def flux_at_start(water: Water) -> FluxAhead:
 
 def start_moving(water: Water, velocity) -> None:
     """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
-    water._start_speed = float(np.sqrt((velocity**2).sum(axis=1).max()))
+    water.start_speed = float(np.sqrt((velocity**2).sum(axis=1).max()))
     water.velocity[water.listed] = velocity[water.listed]
     water.hold(water.velocity, 0.0)
     near = np.zeros(len(velocity), bool)

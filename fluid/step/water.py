@@ -34,24 +34,16 @@ from fluid.step.parameters import WaterParameters
 from fluid.step.potential import level_energy, potential_energy
 from fluid.step.predictor import predicted
 from fluid.step.report import StepReport
+from fluid.step.speeds import START_STEPS, calm, crossing, fastest_place, stable_step
 from fluid.step.start import flux_at_start, start_beside_sides, start_moving, surface_of
-from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gathered, pace
+from fluid.step.time_step import LEAST_COUNTED, fastest_wet
 from fluid.surface.cavities import on_one_side
 from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, drain_films
 from fluid.surface.volume import nodal_volume
-from kernels.decorators import ranged
-from kernels.threads import over
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies
-
-START_STEPS = 2
-"""Steps of a start, which are implicit, and after which the surface lags by no more than by half of each."""
-LONGEST_STEP = 0.3
-"""dt ≤ LONGEST_STEP sqrt(h/g): a step at rest, h the least size of the cells at the surface ..."""
-AT_SURFACE = 3.0
-"""... down to so many of them."""
 
 
 class Water:
@@ -148,7 +140,7 @@ class Water:
         self.given_by_films = nothing(n)
         """(N,) [m³/s] that films and their rims gave each other over the last step (`films.py`)."""
         self.find_band()
-        self._start_speed = 0.0
+        self.start_speed = 0.0
         if velocity is not None:
             start_moving(self, velocity)
         self.renumbered, self.left_behind = None, None
@@ -160,79 +152,22 @@ class Water:
 
     # ---- the step
 
-    def theta(self, dt: float, crossing: float | None = None) -> float:
-        """Weight of the new pressure in a step dt [s]: from `calm_theta` in slow water to `theta` where the fastest
-        crosses a cell in a step; 1 for the first two steps, so that a start at rest does not ring, and always where
-        `theta` is 1. crossing: as in `calm`."""
-        p = self.parameters
-        if self.steps < START_STEPS or p.theta == 1.0:
-            return 1.0
-        return min(p.theta, p.theta - (p.theta - p.calm_theta) * self.calm(dt, crossing))
-
-    def calm(self, dt: float, crossing: float | None = None) -> float:
-        """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]; crossing: `crossing`, None: it is
-        found now."""
-        crossing = self.crossing() if crossing is None else crossing
-        return 1.0 - min(1.0, crossing * dt / self.mesh.spacing)
-
-    def crossing(self) -> float:
-        """Largest component of the velocity [m/s] of the water, in which a cell of any size would be crossed in the
-        time of one of the spacing."""
-        return fastest_wet(self._cells_crossed(), self.level_set, self._roomy)
-
-    def in_waves(self, crossing: float) -> float:
-        """Largest component of the velocity of the water over √(g h), the speed of the shallow-water wave of one of the
-        cells there, of size h. crossing [m/s]: `crossing`."""
-        t, spacing = self.topology, self.mesh.spacing
-        if not t.is_uniform:
-            crossing = fastest_wet(self.velocity * np.sqrt(t.finer)[:, None], self.level_set, self._roomy)
-        return float(crossing / np.sqrt(self.parameters.gravity * spacing))
-
     def stable_step(self) -> float:
-        """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
-        h, t = self.mesh.spacing, self.topology
-        least = LEAST_GATHERED * h**3
-        water = self.nodal_water if t.is_uniform else self.nodal_water * t.finer**3
-        counted = gathered(self._counted(), water, least, *t.around)
-        speed = pace(self._cells_crossed(), self.nodal_water, counted)
-        return float(min(self.longest_step(), self.parameters.courant * h / max(speed, 1e-12)))
-
-    def longest_step(self) -> float:
-        """LONGEST_STEP sqrt(h/g) [s]: the step of water at rest."""
-        return float(LONGEST_STEP * np.sqrt(self._finest_surface() / self.parameters.gravity))
-
-    def _cells_crossed(self):
-        """Velocity (N, 3) [m/s] in which a cell of any size would be crossed in the time of one of the spacing."""
-        t = self.topology
-        return self.velocity if t.is_uniform else self.velocity * t.finer[:, None]
-
-    def _finest_surface(self) -> float:
-        """Least size [m] of the cells at the surface or, where there is none, in the water."""
-        t = self.topology
-        if t.is_uniform:
-            return self.mesh.spacing
-        wet = t.active & (self.level_set < 0.0)
-        near = wet & (self.level_set > -AT_SURFACE * t.node_size)
-        chosen = near if near.any() else wet
-        return float(t.node_size[chosen].min()) if chosen.any() else self.mesh.finest
+        """dt [s]: `speeds.stable_step`."""
+        return stable_step(self)
 
     def fastest(self) -> float:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
-        return fastest_wet(self.velocity, self.level_set, self._roomy)
+        return fastest_wet(self.velocity, self.level_set, self.roomy)
 
     def fastest_place(self) -> tuple[float, Array]:
-        """Speed [m/s] and place (3,) [m] of the fastest water, films beside solids left out; zeros without water."""
-        counted = np.flatnonzero(self._counted())
-        if len(counted) == 0:
-            return 0.0, np.zeros(3)
-        speed = np.linalg.norm(self.velocity[counted], axis=1)
-        worst = int(speed.argmax())
-        return float(speed[worst]), self.topology.nodes[counted[worst]]
+        """Speed [m/s] and place (3,) [m] of the fastest water: `speeds.fastest_place`."""
+        return fastest_place(self)
 
     def kick_factor(self, crossing: float | None = None) -> Array:
         """Share (N,) of the acceleration that is carried over to the next step, no more than kick_limit g, or what
         turns the fastest stream aside within two cells, v²/(2 h). More would throw spray on by the acceleration of an
-        impact. crossing: as in `calm`.
+        impact. crossing: `speeds.crossing`, None: it is found where needed.
 
         The pressure that acts again has the same share at each node, and pushes bodies as it pushes the water only
         where neighbours have the same. Where bodies were cut again, nodes inside them therefore have that of the water
@@ -250,17 +185,6 @@ class Water:
         largest velocity is `fastest` [m/s]."""
         p = self.parameters
         return kick_factor(acceleration, p.kick_limit * p.gravity, 0.5 * fastest**2, size)
-
-    def speed_cap(self) -> float:
-        """Largest speed [m/s] that is permitted: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
-        with at most v; twice what the fall of all of it could give."""
-        p, (low, high) = self.parameters, self.mesh.bounds
-        return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
-
-    def _counted(self):
-        counted = np.empty(len(self.level_set), bool)
-        over(_wet_and_roomy, len(counted), self.level_set, self._roomy, counted)
-        return counted
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure. Nothing of the state changes but
@@ -318,7 +242,9 @@ class Water:
         if before is not None:
             power, through = self._rates()
             # calm water that bodies push moves with what they displace
-            pushed = self.calm(problem.dt) * self._pushed(problem, self.kinetic_energy() - held)
+            pushed = calm(self, problem.dt, crossing(self)) * self._pushed(
+                problem, self.kinetic_energy() - held
+            )
             self._late_energy += (1.0 - pushed) * late * (power - before[0])
             if self.sides is not None:
                 ahead = late * float((through - before[1]) @ self.pressure)
@@ -423,7 +349,7 @@ class Water:
     def set_domain(self, domain) -> None:
         self.domain = domain
         self.topology = t = Topology.of(self.mesh, domain)
-        self._roomy = t.room > LEAST_COUNTED * self.mesh.spacing**3
+        self.roomy = t.room > LEAST_COUNTED * self.mesh.spacing**3
         """(N,) bool: nodes that set the step where they are wet."""
         self.nodes_below_floor = self.below_floor(t.nodes)
         """g·x (N,) [m²/s²] of the nodes."""
@@ -592,12 +518,6 @@ class Water:
         """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
         the tank takes energy with it, wherever the tank lies."""
         return x @ self.parameters.weight - self._lowest
-
-
-@ranged
-def _wet_and_roomy(first, last, phi, roomy, found):
-    for i in range(first, last):
-        found[i] = phi[i] < 0.0 and roomy[i]
 
 
 def _viscosity(parameters: WaterParameters):
