@@ -47,7 +47,7 @@ LONGEST = 100
 """Largest number of characters in the text of a quantity."""
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
-_DECIMAL_COMMA = re.compile(r",\d")
+_COMMA = re.compile(r",(\d+)")
 _FACTOR = r"[^\W\d_%°]*[A-Za-z%°](?:(?:\^|\*\*)?-?\d+)?"
 _UNIT_TEXT = re.compile(rf"(?:(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?")
 _CAPITALS = (
@@ -122,10 +122,10 @@ def _from_text(text: str, unit: str) -> float:
     if match is None:
         raise UnitError(f"{text!r} is not a number with a unit{_example(unit)}")
     number, given = float(match[1]), match[2].translate(_RAISED)
-    if _DECIMAL_COMMA.match(given):
-        raise UnitError(
-            f"{text!r}: a decimal point is needed: '{text.strip().replace(',', '.', 1)}'{_example(unit)}"
-        )
+    if comma := _COMMA.match(given):
+        point, none = (f"'{text.strip().replace(',', by)}'" for by in (".", ""))
+        thousands = f", or {none} if it parts thousands" if len(comma[1]) == 3 else ""
+        raise UnitError(f"{text!r}: a comma is no decimal point: write {point}{thousands}{_example(unit)}")
     if not given and unit:
         raise UnitError(f"{text!r} has no unit{_example(unit)}")
     return number * _factor(given, unit, text)
