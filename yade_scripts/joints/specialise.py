@@ -27,7 +27,7 @@ def specialised(
     """`kernel`, a plain function, compiled with `chosen` in place of the globals of these names.
 
     name: must differ for every choice, since it names the compiled code on disk · ranged: it takes a range first, which
-    several threads may share (`kernels/ranges.py`) · inlined: its code stands where it is called, and it makes no arrays
+    several threads may share (`kernels/ranges.py`) · inlined: its code stands where it is called, and makes no arrays
     """
     copy = FunctionType(kernel.__code__, kernel.__globals__ | chosen, kernel.__name__, kernel.__defaults__)
     copy.__qualname__, copy.__module__ = f"{kernel.__qualname__}_{name}", kernel.__module__
