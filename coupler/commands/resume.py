@@ -20,7 +20,10 @@ def resume(
     set: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="change time.end, time.cfl, time.step_max, limits.* ..."
+            "--set",
+            metavar="KEY=VALUE",
+            help="change time.*, for instance time.output_every, limits.*, coupling.* or a share of the verdict; "
+            "names that must stay are refused with the reason",
         ),
     ] = None,
     law: Laws = None,

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel
 
+from coupler.case.case import Case
 from coupler.case.schedule import Schedule, next_multiple
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.run.array_file import Damaged, read_arrays, write_arrays
@@ -85,9 +86,13 @@ class Checkpoint:
         """[s]"""
         return float(self.arrays["coupling/time"])
 
-    def schedule(self, end: float) -> Schedule:
-        """Outputs of the run, up to another end [s]."""
-        return Schedule(*self.about["outputs"], end=end)
+    def schedule(self, case: Case) -> Schedule:
+        """Outputs of the run as it continues with a case: up to its end, and at multiples of its interval where that
+        has changed since."""
+        every = case.time.output_every
+        if every is not None and every != self.about["case"].get("time", {}).get("output_every"):
+            return Schedule(every, 1, case.time.end)
+        return Schedule(*self.about["outputs"], end=case.time.end)
 
 
 ALWAYS = ("coupling/time", "recorder/outputs")

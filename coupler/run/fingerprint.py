@@ -13,7 +13,16 @@ import numpy as np
 from coupler.case.paths import stamp
 from coupler.program import provenance
 
-FREE = ("time.end", "time.step_max", "time.cfl", "time.checkpoint_every", "coupling.", "limits.")
+FREE = (
+    "time.",
+    "coupling.",
+    "limits.",
+    "verdict.damaged_joints",
+    "verdict.collapsed_weight",
+    "verdict.collapsed_joints",
+    "case.title",
+    "case.description",
+)
 """Names of the case that may change when a run goes on; with a dot at the end: a whole section."""
 FILE_KEYS = ("path", "surface")
 """Keys of a case whose values name files, that of the mesh aside, which is compared as a mesh."""

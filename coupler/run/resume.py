@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from coupler.case.case import effective
-from coupler.checks.read_case import CaseFile, load
+from coupler.checks.read_case import CaseFile, changed, load
 from coupler.program.errors import FULL, ExitCode, SurgebreakError
 from coupler.results import vtkhdf
 from coupler.run.array_file import Damaged
@@ -51,7 +52,7 @@ def prepare(
     summary = read_summary(path)
     _check_idle(path, summary)
     overrides = tuple(overrides)
-    _check_free(overrides)
+    _check_free(overrides, summary.get("case") or {})
     lock = _locked(path)
     summary = read_summary(path)  # of the process that held it until now
     checkpoint, unusable = _newest(path)
@@ -117,14 +118,35 @@ def _is_ours(process: int) -> bool:
     return any(Path(word).name == "surgebreak" or word.startswith("coupler.") for word in words[1:])
 
 
-def _check_free(overrides: tuple[str, ...]) -> None:
+def _check_free(overrides: tuple[str, ...], case: dict) -> None:
+    """Check that nothing else is changed than a run may change as it continues. Raises BadCase for a name that no case
+    has, CannotResume for one that must stay, with the reason. case: effective"""
     for override in overrides:
         key = override.partition("=")[0].strip()
-        if not any(is_free(key, name) for name in FREE):
-            raise CannotResume(
-                f"--set {override}: a run that goes on keeps its scene; only "
-                f"{', '.join(name + '*' if name.endswith('.') else name for name in FREE)} may change"
-            )
+        if any(is_free(key, name) for name in FREE):
+            continue
+        changed(case, override)  # refuses what is no name of a case
+        raise CannotResume(
+            f"--set {override}: {_why_kept(key)}. What may change as a run continues: "
+            f"{', '.join(name + '*' if name.endswith('.') else name for name in FREE)}"
+        )
+
+
+def _why_kept(key: str) -> str:
+    """Why the value of this key is the same during a whole run."""
+    section = re.split(r"[.\[]", key, maxsplit=1)[0]
+    if section in ("study", "sweep"):
+        return f"a run does not read [{section}], so that this would change nothing"
+    if section == "gauge":
+        return (
+            "the tables of the gauges keep the columns with which they began; a further gauge needs a new run"
+        )
+    if section == "verdict":
+        return "the run has followed its blocks by this rule from the start, and cannot judge the past by another"
+    return (
+        "this belongs to what the run computes, and its first part was computed with another value; for the answer "
+        "with this one, run the case anew"
+    )
 
 
 def _newest(path: Path) -> tuple[Checkpoint, list[str]]:

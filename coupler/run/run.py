@@ -149,7 +149,7 @@ def _steps(
 ) -> None:
     coupling = scene.coupling
     limits = limits_of(case)
-    schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
+    schedule = checkpoint.schedule(case) if checkpoint else Schedule.of(case)
     kept = checkpoint.part("recorder") if checkpoint else None
     recorder = Recorder(
         directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept, scene.watch, scene.maps

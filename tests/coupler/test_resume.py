@@ -9,6 +9,8 @@ import pytest
 
 from coupler.commands.warm_up import Silent
 from coupler.program.errors import ExitCode
+from coupler.results import vtkhdf
+from coupler.results.history import read_history
 from coupler.run.checkpoint import FOLDER, LAYOUT, Checkpoint, listed
 from coupler.run.resume import CannotResume, prepare
 from coupler.step.limits import LimitReached
@@ -285,6 +287,18 @@ def test_a_run_goes_on_past_its_end(dry, tmp_path):
     assert found.checkpoint.time == pytest.approx(0.06)
     check_same(dry, path)
     assert json.loads((path / "effective.json").read_text(encoding="utf-8"))["time"]["end"] == 0.1
+
+
+def test_another_interval_of_outputs_counts_from_the_checkpoint_on(dry, stopped):
+    """Outputs at 10 ms until 80 ms, then at the multiples of 7 ms and at the end; a second continuation, without a
+    change, keeps the interval that the first one set."""
+    go_on(stopped, "time.output_every='7 ms'")
+    times = vtkhdf.read_times(stopped / "blocks.vtkhdf")
+    np.testing.assert_allclose(times, [*(0.01 * k for k in range(9)), 0.084, 0.091, 0.098, 0.1])
+    rows = read_history(stopped / "history" / "structure.csv")["joints_broken"]
+    assert rows[-1] == read_history(dry / "history" / "structure.csv")["joints_broken"][-1]
+    go_on(stopped, "time.end='0.11 s'")
+    np.testing.assert_allclose(vtkhdf.read_times(stopped / "blocks.vtkhdf")[-2:], [0.105, 0.11])
 
 
 SLEEPS = """\

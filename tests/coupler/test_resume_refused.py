@@ -54,10 +54,15 @@ def test_another_case_is_refused_with_the_difference(stopped):
 
 
 def test_only_what_leaves_the_scene_alone_may_be_set(stopped):
-    with pytest.raises(
-        CannotResume, match=r"--set contact.friction=0.1: .*only time.end, .*limits.\* may change"
+    for change, why in (
+        ("contact.friction=0.1", "first part was computed with another value"),
+        ("verdict.moved=0.2", "followed its blocks by this rule"),
+        ("sweep.seed=3", "does not read"),
     ):
-        prepare(stopped, ["contact.friction=0.1"])
+        with pytest.raises(CannotResume, match=rf"--set {change}: .*{why}.*: time\.\*, .*limits\.\*"):
+            prepare(stopped, [change])
+    with pytest.raises(BadCase, match=r"output_evry.*did you mean 'output_every'"):
+        prepare(stopped, ["time.output_evry=0.1"])
     with pytest.raises(BadCase, match=r"limits\.defect: -1 is out of range"):
         prepare(stopped, ["limits.defect=-1"])
     assert go_on(stopped, "limits.energy_error=0.5").file.case.limits.energy_error == 0.5
