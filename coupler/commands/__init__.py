@@ -19,6 +19,7 @@ offshore                   the sea off the coast, by ANUGA, as a record for a si
 watch                      a live page about runs and sweeps
 report, pictures, view     pages and pictures, made from the files of a run
 report_command             `surgebreak report`, for runs, studies and sweeps
+diff                       two or more runs side by side
 export                     results in files for other programs
 pages, case_pages, site    pages made from code, figures on the pages of cases, all pages as HTML
 

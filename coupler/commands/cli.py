@@ -14,6 +14,7 @@ from coupler.commands.benchmark.arguments import benchmark
 from coupler.commands.blocks.arguments import blocks
 from coupler.commands.check import check
 from coupler.commands.compare.arguments import compare
+from coupler.commands.diff.arguments import diff
 from coupler.commands.doctor.arguments import doctor
 from coupler.commands.explain import explain
 from coupler.commands.export.arguments import export
@@ -45,6 +46,7 @@ COMMANDS = (
     (check, {}),
     (render, PASS_ON | {"help_option_names": []}),
     (report, {}),
+    (diff, {}),
     (export, {}),
     (doctor, {}),
     (explain, {}),

@@ -46,6 +46,11 @@ def study_figures(study: Path) -> str:
     return _view("coupler.commands.view.study", study)
 
 
+def run_figures(folder: Path) -> str:
+    """The histories of several runs over one another, beside diff.json; the reason if they could not be drawn."""
+    return _view("coupler.commands.view.over_one_another", folder)
+
+
 def draw(module: str, folder: Path) -> None:
     """Figures of a comparison or a study beside its tables; where there are none, a line says why."""
     reason = missing() or figures(module, folder)
