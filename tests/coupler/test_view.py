@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 from coupler.commands.view.__main__ import main, pixels, rate
-from coupler.commands.view.plots import LINES_PER_PANEL, common, grouped, of_each_block, plots, prefixed
+from coupler.commands.view.plots import (
+    LINES_PER_PANEL,
+    STYLE,
+    by_component,
+    common,
+    grouped,
+    of_each_block,
+    panel,
+    plots,
+    plt,
+    prefixed,
+)
 from coupler.program import extras
 from coupler.results.fields import WaterWriter
 from coupler.results.history import HistoryTable, by_block, read_history
@@ -246,6 +257,34 @@ def test_a_reader_who_has_enough_ends_the_pictures_quietly(tmp_path):
         view.stdout.close()
         assert view.stderr.read() == ""
     assert view.returncode == 4
+
+
+def test_each_component_of_a_load_shows_its_parts_beside_their_sum(tmp_path):
+    """A panel of all contact forces and one of all sums: what struck could not be told from what pressed, and where
+    contact was all there is, the line of the sum hid it."""
+    parts = ("pressure", "contact", "total")
+    names = [f"{part}_{what}" for part in parts for what in ("force_x", "force_z", "moment_y")]
+    units = ["N m" if "moment" in name else "N" for name in names]
+    table = HistoryTable(
+        tmp_path / "loads_pier.csv", [("time", "s", ""), *((n, u, n) for n, u in zip(names, units))]
+    )
+    for k in range(3):
+        table.append(time=k, **{n: 0.0 if n == "pressure_force_x" else 50.0 * k for n in names})
+    table.close()
+    history = read_history(tmp_path / "loads_pier.csv")
+    panels = by_component(history)
+    assert panels == [
+        ("N", ["contact_force_x", "total_force_x"]),
+        ("N", ["pressure_force_z", "contact_force_z", "total_force_z"]),
+        ("N m", ["pressure_moment_y", "contact_moment_y", "total_moment_y"]),
+    ]
+    with plt.rc_context(STYLE):
+        axis = plt.figure().subplots()
+        panel(axis, history, *panels[0])
+    contact, total = axis.lines
+    assert (contact.get_label(), total.get_label(), axis.get_ylabel()) == ("contact", "total", "force x [N]")
+    assert total.get_zorder() < contact.get_zorder()
+    assert total.get_linewidth() > 2.0 * contact.get_linewidth()
 
 
 def test_panels_hold_whole_vectors_of_like_size(tmp_path):

@@ -7,7 +7,7 @@ os.environ.setdefault("MPLBACKEND", "agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from coupler.commands.view.palette import INK, LINES
+from coupler.commands.view.palette import INK, LINES, SOLID
 from coupler.results.history import Column, History, by_block, read_history
 
 WIDTH = 6.9  # [inch] two columns of a journal
@@ -48,7 +48,7 @@ def plots(directory, folder):
         if blocks is not None and len(blocks.names) > LINES_PER_PANEL:
             continue
         if blocks is None:
-            panels = grouped(history)
+            panels = by_component(history) if is_loads(history) else grouped(history)
         else:
             history, panels = of_each_block(history, blocks)
         if panels and len(history["time"]) > 1:
@@ -86,6 +86,36 @@ def leaves(panels):
         found[-1].append((unit, names))
         room -= height
     return found
+
+
+LOADS, TOTAL, PARTS = "loads_", "total", ("pressure", "friction", "contact", "joint", "weight")
+"""Tables of loads by their origin begin so; their columns PART_force_x, ... are of these parts and of their sum."""
+
+
+def is_loads(history):
+    """Whether a table has the loads on a group by their origin."""
+    return history.title.startswith(LOADS) and f"{TOTAL}_force_x" in history.values
+
+
+def by_component(history):
+    """Panels [(unit, [column names])] of a table of loads: each component of forces, moments, impulses, ... with its
+    parts beside one another, their sum last; without parts and components that are round-off."""
+    largest, found = {}, {}
+    for column in history.columns:
+        if column.name != "time" and column.unit:
+            size = np.nanmax(np.abs(history[column.name]), initial=0.0)
+            largest[column.unit] = max(largest.get(column.unit, 0.0), size)
+            found.setdefault((column.unit, _component(column.name)), {})[column.name] = size
+    panels = [
+        (unit, [name for name, size in sizes.items() if size > NEGLIGIBLE * largest[unit]])
+        for (unit, _), sizes in found.items()
+    ]
+    return [(unit, names) for unit, names in panels if names]
+
+
+def _component(name):
+    """force_x of contact_force_x."""
+    return name.partition("_")[2]
 
 
 def grouped(history):
@@ -169,15 +199,32 @@ def panel(axis, history, unit, names):
     values = {name: changed(history, name) for name in names}
     power, text = prefixed(unit, max(np.nanmax(np.abs(v), initial=0.0) for v in values.values()))
     for name, value in values.items():
-        axis.plot(history["time"], value / 1000.0**power, label=name.replace("_", " "))
-    since = "change since start" if history.title in SINCE_START and unit == "J" else ""
-    alone = len(names) == 1
-    what = (not alone and since) or common(names) or QUANTITY.get(unit, "")
-    axis.set_ylabel(f"{what} [{text}]".strip())
+        axis.plot(history["time"], value / 1000.0**power, **_look(history, name))
+    axis.set_ylabel(f"{_words(history, unit, names)} [{text}]".strip())
     axis.margins(x=0)
     _keep_flat(axis)
-    if not alone:
+    if len(names) > 1 or is_loads(history):
         axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def _look(history, name):
+    """Label and colour of a line. The sum of loads lies broad and grey beneath its parts, so that it is seen where one
+    part is all there is."""
+    if not is_loads(history):
+        return {"label": name.replace("_", " ")}
+    part = name.partition("_")[0]
+    if part == TOTAL:
+        return {"label": part, "color": SOLID, "linewidth": 3.0, "zorder": 1.9}
+    return {"label": part, "color": LINES[PARTS.index(part)]}
+
+
+def _words(history, unit, names):
+    """What the axis of a panel measures."""
+    if is_loads(history):
+        return _component(names[0]).replace("_", " ")
+    if len(names) > 1 and history.title in SINCE_START and unit == "J":
+        return "change since start"
+    return common(names) or QUANTITY.get(unit, "")
 
 
 def common(names):
