@@ -148,9 +148,11 @@ def material_remarks(case: Case) -> Iterator[str]:
 
 
 def _friction_remarks(case: Case) -> Iterator[str]:
-    """A friction of [contact] that does not apply where the frictions of presets do."""
+    """A friction of [contact] that counts nowhere, since all blocks that can move are of presets with their own."""
     if case.contact is None or "friction" not in case.contact.model_fields_set:
         return
+    if any(name not in PRESETS for name in _materials(case, held=False)):
+        return  # it counts where one of the others meets something
     found = [pair for pair in case.contact.pair if isinstance(pair, PresetPair)]
     found = [pair for pair in found if pair.friction != case.contact.friction]
     if found:

@@ -18,11 +18,9 @@ DRAFTS = {
     "tsunami_town": [
         "thinner than a cell",
         "under 3 cells water is not resolved",
-        "0.6 does not apply where the friction of presets does: 0.4 between ground and timber",
     ]
 }
-"""Cases that are coarser than their remarks want, and say so in their README, or in which houses of timber stand among
-others: what they may be remarked for."""
+"""Cases that are coarser than their remarks want, and say so in their README: what they may be remarked for."""
 
 
 @pytest.mark.parametrize("place", CASES, ids=lambda place: place.name)

@@ -194,6 +194,16 @@ def test_a_friction_that_presets_replace_is_told_where_it_does_not_apply(tmp_pat
     assert "brick-masonry and brick-masonry" not in line
 
 
+def test_a_friction_that_counts_for_other_materials_is_not_remarked_on(tmp_path):
+    """It is what stones meet one another and the timber with, though not the bricks."""
+    text = QUAY.replace('material = "concrete"', 'material = "stone"').replace(
+        "[contact]", "[contact]\nfriction = 0.2"
+    )
+    text = text.replace("[joints]", '[joints]\nstrength = "1 MPa"\nopening_at_failure = "1 mm"')
+    (tmp_path / "case.toml").write_text(text)
+    assert not [line for line in remarks(load(tmp_path).case) if line.startswith("contact.friction")]
+
+
 def test_blocks_that_are_not_to_be_glued_to_the_ground_are_not_by_a_preset_either(tmp_path):
     (tmp_path / "case.toml").write_text(CASE.replace("[joints]", "[joints]\nground = false"))
     assert all("ground" not in pair.between for pair in load(tmp_path).case.joints.pair)
