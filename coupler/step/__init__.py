@@ -5,7 +5,7 @@ exchange                               the exchange between pressure and structu
 passes                                 the passes of a step and their relaxation
 immersion, cracks                      where the structure cuts the water
 pressure_with_structure                the pressure system with the blocks in it
-coupling_rows                          the matrix G of theory (10), a short row for each node and body
+coupling_rows                          the matrix G of theory (9), a short row for each node and body
 shear                                  implicit response of blocks to shear
 residual                               the coupling residual, and its history over steps
 step_limits, step_start, limits        when a step is taken again, and when a run ends
