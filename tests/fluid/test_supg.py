@@ -317,6 +317,18 @@ def test_what_is_held_at_the_rim_of_the_band_is_held_at_any_step():
         np.testing.assert_array_equal(moved[rim[water.listed]], u_hat[water.listed][rim[water.listed]])
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_water_is_held_where_it_comes_in_and_not_where_it_leaves(sign):
+    """What is outside an open side is unknown, so velocities are kept at the end where the stream enters; at the other
+    end they follow from the water inside, and held there they would reflect whatever arrives."""
+    water, u_m, *_ = _jump_in_a_stream(1.0)
+    rim = supg.rim(water, sign * u_m)
+    ends = [water.topology.nodes[:, 0] == end for end in (0.0, 2.0)]
+    enters, leaves = ends if sign > 0.0 else ends[::-1]
+    assert rim[enters].all()
+    assert not rim[leaves].any()
+
+
 @pytest.mark.parametrize("cells", [3, 4])
 def test_a_coarse_dam_break_gains_no_energy(cells):
     """A column of three or four cells: the front is a sheet of one cell, which the forms do not resolve. Where its
