@@ -165,6 +165,23 @@ def test_pockets_hand_on_their_air_by_shares_when_they_part_and_together_when_th
     assert filled.gone.tolist() == [False, True]
 
 
+@pytest.mark.parametrize(
+    ("part", "opened"), [(0.5, 0.0), (2.0, 0.2)], ids=["a sliver of the pocket", "a fifth of the pocket"]
+)
+@pytest.mark.parametrize("open_air", [2.0, 200.0])
+def test_no_air_escapes_with_a_node_that_a_moving_wall_leaves_on_its_other_side(part, opened, open_air):
+    """Less than a tenth of a pocket is such a node, however little open air there is beside it; more is a leak. The
+    same of open air whose nodes come to lie in the pocket: a sliver brings no air, and the pocket is as it was."""
+    node_volume = np.array([10.0 - part, part, open_air])
+    inside, outside = np.array([1, 1, 0]), np.array([1, 0, 0])
+    out = Descent.of(inside, 1, outside, 1, node_volume)
+    np.testing.assert_allclose(out.opened, [opened])
+    assert out.only.tolist() == [0 if opened == 0.0 else -1]
+    back = Descent.of(outside, 1, inside, 1, node_volume)
+    np.testing.assert_allclose(back.fresh, [part if opened else 0.0])
+    assert back.only.tolist() == [0 if opened == 0.0 else -1]
+
+
 # ---- at rest
 
 
