@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fluid.surface.pools import pools
+from fluid.surface.pools import own_shift, pools
 from kernels import threads
 from tests.fluid.scenes import tank
 
@@ -47,3 +47,17 @@ def test_pools_of_ranges_are_joined_along_their_borders(count, on_threads):
     label, found = pools(phi, *t.around)
     assert number == found > 2
     np.testing.assert_array_equal(label, expected)
+
+
+@pytest.mark.parametrize(("total", "lengths"), [(0.2, [0.0, 0.05, 0.0, 0.0]), (-0.2, [0.1, 0.0, 0.0, 0.0])])
+def test_a_pool_makes_up_for_what_it_lacks_itself(total, lengths):
+    """Pool 0 has 0.3 m³ too much below 3 m², pool 1 lacks 0.1 m³ below 2 m², and pool 2, under a lid, lacks as much.
+    Where all water lacks some, only pools that lack some rise, by volume over area; where all has too much, only those
+    with too much sink: a correction in the other direction would take from one pool what another lacks."""
+    label = np.array([0, 0, 1, 1, 2, -1])
+    carried = np.array([1.0, 1.0, 2.0, 2.0, 1.1, 0.0])
+    inner = np.array([0.7, 0.8, 1.1, 1.0, 1.0, 0.0])
+    near = np.array([0.5, 0.3, 0.8, 1.0, 0.0, 0.0])
+    area = np.array([1.0, 2.0, 1.5, 0.5, 0.0, 0.0])
+    found = own_shift(label, 3, np.array([1, 3, 4, 5]), (carried, inner, near), area, total)
+    np.testing.assert_allclose(found, lengths, atol=1e-15)
