@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from coupler.commands.verify.figures import columns
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import (
     ContactError,
@@ -22,12 +23,6 @@ G = 9.81
 
 def cube(z, **more):
     return Block("cube", (0.0, 0.0, z), size=1.0, density=2000.0, **more)
-
-
-def balance(e):
-    """Energies minus works: constant where the ledger closes."""
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 def test_damping_ratios_against_the_closed_forms():

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kernels.decorators import kernel
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.edges import CROSSES, find_crossing, pair_scratch
 from yade_scripts.contact.law import ContactLaw
@@ -145,12 +146,6 @@ def test_an_edge_that_slides_past_the_end_of_another_lets_go_with_what_its_sprin
             assert balance(after) == pytest.approx(balance(before), abs=1e-3)
         assert s.centre()[1, 0] > 0.502
         assert after["friction"] > 10.0
-
-
-def balance(e):
-    """Energies minus works: constant where the ledger closes."""
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 def overlap(blocks, centres, rotations):

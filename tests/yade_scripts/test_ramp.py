@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
@@ -27,11 +28,6 @@ def swings(ramp):
             momentum += weight + report.impulses.joint[0, 2]
             assert momentum == pytest.approx(MASS * s.velocity()[0, 2], abs=1e-9 * MASS)
         return deepest, balance(s.energies()) - balance(start), s.energies()["driving_work"]
-
-
-def balance(e):
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 def test_a_weight_that_comes_on_at_once_sinks_twice_as_deep_as_one_that_comes_on_gradually():

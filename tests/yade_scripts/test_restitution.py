@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
@@ -23,12 +24,6 @@ def returned(blocks, law, phase, ground=None):
         s.advance(300 * dt, dt)
         v, e = s.velocity()[:, 2], s.energies()
     return float(v[0] - v[1] if len(v) > 1 else v[0]), balance(e) / balance(start)
-
-
-def balance(e):
-    """Energies minus works [J]."""
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 @pytest.mark.parametrize("ratio", [1e-3, 0.1, 1.0, 10.0, 1e3])

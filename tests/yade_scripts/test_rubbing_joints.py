@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
@@ -52,11 +53,6 @@ def test_shear_is_the_law_where_it_holds_and_friction_where_it_has_failed(law):
         assert balance(end) == pytest.approx(balance(start), abs=2e-3 * end["driving_work"])
         assert end["joint_dissipated"] == pytest.approx(s.law_dissipation(), abs=0.01 * end["driving_work"])
         assert s.tangent()[0].toarray()[6, 6] > 0.9 * k * area
-
-
-def balance(e):
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 def test_without_friction_failed_points_slide_freely():

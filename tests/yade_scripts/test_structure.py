@@ -6,6 +6,7 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from coupler.commands.verify.figures import columns
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block, BlockError
 from yade_scripts.blocks.generators.column import column_of_boxes
 from yade_scripts.blocks.generators.wall import wall_of_blocks
@@ -17,11 +18,6 @@ from yade_scripts.yade_side.scene import SceneInUse
 
 LAW = JointParameters(strength=1e6, opening_at_failure=1e-3, damping=0.0)
 STILL = (0.0, 0.0, 0.0)
-
-
-def balance(e):
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 def pulled(law=LAW, **motion):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.yade_scripts.ledger import balance
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.law import ContactLaw
@@ -48,11 +49,6 @@ def fail(s):
     s.advance(2 * DT, DT)
     assert not s.joints.alive.any()
     return before
-
-
-def balance(e):
-    works = ("load_work", "driving_work")
-    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
 def pressing(s):
