@@ -11,6 +11,9 @@ from coupler.verdict.divisions import in_words
 MOST_IN_ORDER = 12
 """Walls and floors whose first break is reported in a line; the table has all."""
 
+MOST_NAMED = 8
+"""Bodies of one state that are named in a line; the table of buildings has all."""
+
 SOON = 0.5
 """Share of the length of a run within which a block that moves at its end would leave its place."""
 
@@ -23,6 +26,7 @@ def headline(reported: dict) -> str:
 def sentences(reported: dict) -> Iterator[str]:
     """The verdict line by line; its argument is what `judge.verdict` returns."""
     yield headline(reported)
+    yield from _of_bodies(reported["bodies"])
     yield from _first_break(reported)
     yield from _order(reported)
     yield from _loads(reported["largest"])
@@ -70,6 +74,26 @@ def name_of(reported: dict, name: str) -> str:
 def point(place: Sequence[float]) -> str:
     """(30.00, 9.00, 2.20) m"""
     return "({}) m".format(", ".join(f"{x + 0.0:.2f}" for x in place))
+
+
+def _of_bodies(bodies: Sequence[dict]) -> Iterator[str]:
+    """Where several buildings, walls or groups have joints: how many of them collapsed, and which. The headline judges
+    all of them together, so that a town of which two houses collapsed is damaged."""
+    joined = [body for body in bodies if body["joints"]]
+    if len(joined) < 2:
+        return
+    parts = []
+    for state in ("collapsed", "damaged", "stands"):
+        names = [body["name"] for body in joined if body["state"] == state]
+        if not names:
+            continue
+        verb = {"collapsed": "collapsed", "damaged": "are damaged", "stands": "stand"}[state]
+        if len(names) == 1:
+            verb = {"collapsed": "collapsed", "damaged": "is damaged", "stands": "stands"}[state]
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        which = f" ({', '.join(names[:MOST_NAMED])}{more})" if state != "stands" else ""
+        parts.append(f"{len(names)} {verb}{which}")
+    yield f"of {len(joined)} bodies with joints " + ", ".join(parts)
 
 
 def _first_break(reported: dict) -> Iterator[str]:

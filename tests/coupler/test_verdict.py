@@ -16,7 +16,7 @@ from coupler.verdict.damage import Rules, state_of
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import _largest, places_of, verdict
 from coupler.verdict.watch import Peaks, Watch
-from coupler.verdict.words import sentences, unreached, unsettled
+from coupler.verdict.words import _of_bodies, sentences, unreached, unsettled
 from tests.coupler.resumed import DRY, begin
 from tests.coupler.test_docs import FIGURES
 from yade_scripts.blocks.block import Block
@@ -151,6 +151,18 @@ def test_nothing_happened(scene):
     assert reported["largest"]["force"] is None
     assert "no joint of 2 broke" in list(sentences(reported))
     assert "until the run ended at t = 0.1 s" in unreached(reported, 0.1)
+
+
+def test_a_town_is_told_house_by_house():
+    """All houses together are damaged at most while most of them stand, so the second line says which collapsed."""
+    states = {"H1": "stands", "H2": "collapsed", "H3": "damaged", "H4": "collapsed", "H5": "stands"}
+    bodies = [{"name": name, "state": state, "joints": 9} for name, state in states.items()]
+    crate = {"name": "crate", "state": "collapsed", "joints": 0}
+    (line,) = _of_bodies([*bodies, crate])
+    assert line == "of 5 bodies with joints 2 collapsed (H2, H4), 1 is damaged (H3), 2 stand"
+    assert list(_of_bodies([bodies[1], crate])) == []
+    (line,) = _of_bodies([{"name": f"H{i}", "state": "damaged", "joints": 1} for i in range(11)])
+    assert line.endswith("H6, H7 and 3 more)")
 
 
 def test_blocks_without_joints_are_not_said_to_keep_them():
