@@ -92,6 +92,11 @@ def _csv(path: str, with_velocity: bool = True) -> Record:
         raise RecordError(
             f"{path}: no column {', '.join(missing)}; its first line must name "
             f"{', '.join(wanted)}, with commas between"
+            + (
+                '; for a record of levels alone write velocity = "long-wave"'
+                if missing == ["velocity"]
+                else ""
+            )
         )
     table = np.array([_numbers(path, n, line, len(head)) for n, line in numbered[1:]]).reshape(-1, len(head))
     if not len(table):

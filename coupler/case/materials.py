@@ -83,7 +83,10 @@ def with_presets(case: Case) -> Case:
         for kind in type(case.structure).model_fields
         if isinstance(getattr(case.structure, kind), tuple)
     }
-    update: dict[str, Any] = {"structure": case.structure.model_copy(update=changes)}
+    update: dict[str, Any] = {
+        "structure": case.structure.model_copy(update=changes),
+        "solid": tuple(map(_with_density, case.solid)),
+    }
     if case.joints is not None:
         update["joints"] = case.joints.model_copy(update={"pair": (*_joints(case, used), *case.joints.pair)})
     if case.contact is not None:

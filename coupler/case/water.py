@@ -312,5 +312,7 @@ class Solid(Section):
     )
     material: Name = Field("solid", description=MATERIAL)
     density: Density | None = Field(
-        None, description="density, for its weight among the loads; absent: structure.density"
+        None,
+        description="density, for its weight among the loads alone, since it never moves; absent: that of its material "
+        "where that is a preset, else 2400 kg/m3, whatever the blocks have",
     )

@@ -20,6 +20,8 @@ BOX_CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
     float,
 )
+DENSITY = 2400.0
+"""[kg/m³] of solids without one, as of concrete and rock, whatever the blocks have: crates say nothing of a quay."""
 BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
 
 
@@ -46,7 +48,7 @@ def solids_of(case: Case) -> tuple[FixedSolid, ...]:
 def obstacle_blocks(case: Case) -> list:
     """The fixed solids as held blocks, in the order of `solids_of`: blocks may touch them, and joints may
     glue blocks to them."""
-    solids = [block for i, spec in enumerate(case.solid) for block in _held(case, spec)]
+    solids = [block for spec in case.solid for block in _held(spec)]
     return solids + [block for _, block in _footings(case)]
 
 
@@ -80,9 +82,9 @@ def _as_solid(path: KeyPath, block) -> FixedSolid:
     return FixedSolid(path, block.name, block.world_vertices(), block.faces, Body.of_block(block))
 
 
-def _held(case: Case, spec) -> list:
+def _held(spec) -> list:
     """Blocks of one table; those of a file are numbered, and all are a group of its name."""
-    density = spec.density or case.structure.density
+    density = spec.density or DENSITY
     return _blocks(spec, density=density, material=spec.material, group=spec.name, fixed=True)
 
 

@@ -17,7 +17,7 @@ def read(path, side="x-", turn=0.0, **keys):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("time,level\n0,1\n", "no column velocity"),
+        ("time,level\n0,1\n", 'no column velocity.*levels alone write velocity = "long-wave"'),
         ("time,level,velocity\n0,1\n", "r.csv:2: 2 values; every line needs 3"),
         ("time,level,velocity\n1,1,0\n0,1,0\n", "r.csv:3: times must increase; 0 s comes after 1 s"),
         ("# a\n\ntime,level,velocity\n0,a,0\n", "r.csv:4: 'a' is not a number"),

@@ -165,6 +165,20 @@ def test_a_strength_is_asked_for_where_a_material_has_none(tmp_path):
     assert "joints.opening_at_failure: missing" in opening
 
 
+def test_a_solid_has_the_density_of_its_material_and_not_that_of_the_blocks(tmp_path):
+    """Its density counts for its weight among the loads alone; a quay under crates of 350 kg/m3 weighed as they do."""
+    from coupler.geometry.solids import obstacle_blocks
+
+    def density(*overrides):
+        (tmp_path / "case.toml").write_text(QUAY.replace("[structure]", "[structure]\ndensity = 350", 1))
+        (quay,) = obstacle_blocks(load(tmp_path, overrides).case)
+        return quay.density
+
+    assert density() == 2400.0
+    assert density("solid[0].material='timber'") == PRESETS["timber"].density
+    assert density("solid[0].material='timber'", "solid[0].density=500") == 500.0
+
+
 def test_a_name_near_a_preset_and_a_strength_that_counts_nowhere_are_told(tmp_path):
     with_strength = QUAY + 'strength = "1 MPa"\nopening_at_failure = "1 mm"\n'
     (tmp_path / "case.toml").write_text(with_strength.replace('"brick-masonry"', '"brick-masonery"'))
