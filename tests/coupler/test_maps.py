@@ -5,16 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from scipy.io import netcdf_file
 
 from coupler.checks.read_case import load
 from coupler.commands.export.netcdf import write_netcdf
 from coupler.commands.view.flood_map import draw, in_tank
+from coupler.commands.view.footprints import of_blocks, of_solids
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
 from coupler.results.even_raster import even_raster
+from coupler.results.fields import BlockWriter, write_solids
 from coupler.results.maps import NEVER, Maps, read_map
 from coupler.scene.build_water import water_of
+from tests.coupler.synthetic_run import BOX_FACES, box_vertices
 
 CASE = """
 [case]
@@ -216,19 +220,55 @@ def test_row_of_a_building_has_the_flood_around_it_and_its_walls_in_the_order_of
     assert _walls("pier", [members[0] | {"name": "pier"}], ("pier",)) == ""
 
 
-def test_a_map_without_a_value_says_so_and_has_no_scale(tmp_path, monkeypatch):
-    """Where no dry ground was reached, the arrival had a scale from 0 to 1 s."""
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are saved, instead of files."""
     import matplotlib.figure
 
-    (tmp_path / "maps").mkdir()
-    (tmp_path / "effective.json").write_text('{"tank": {"lower": [0, 0, 0]}}', encoding="utf-8")
+    found = []
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda self, *_, **__: found.append(self))
+    return found
+
+
+def small_maps(run, arrival="-9999 -9999 -9999"):
+    """Maps of three by three points from (0, 0) to (2, 2) m."""
+    (run / "maps").mkdir()
+    (run / "effective.json").write_text('{"tank": {"lower": [0, 0, 0]}}', encoding="utf-8")
     for name in ("bed", "depth", "speed", "flux", "arrival"):
-        rows = "\n".join(["-9999 -9999 -9999" if name == "arrival" else "1 2 3"] * 3)
+        rows = "\n".join([arrival if name == "arrival" else "1 2 3"] * 3)
         head = "ncols 3\nnrows 3\nxllcenter 0\nyllcenter 0\ncellsize 1\nNODATA_value -9999\n"
-        (tmp_path / "maps" / f"{name}.asc").write_text(f"{head}{rows}\n", encoding="utf-8")
-    drawn = []
-    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda self, *_, **__: drawn.append(self))
+        (run / "maps" / f"{name}.asc").write_text(f"{head}{rows}\n", encoding="utf-8")
+
+
+def test_a_map_without_a_value_says_so_and_has_no_scale(tmp_path, drawn):
+    """Where no dry ground was reached, the arrival had a scale from 0 to 1 s."""
+    small_maps(tmp_path)
     draw(tmp_path, tmp_path / "map.png", "a site")
     said = [text.get_text() for axis in drawn[0].axes for text in axis.texts]
     assert said == ["no dry ground was reached"]
     assert len(drawn[0].axes) == 4 + 3  # three have a scale
+    assert not drawn[0].legends
+
+
+def test_every_map_shows_solids_and_blocks_in_their_places(tmp_path, drawn):
+    """Without them nobody sees what the water stood against; a quay was not in the map at all."""
+    small_maps(tmp_path)
+    box = box_vertices((0.5, 0.2, 1.0))
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    writer = BlockWriter(tmp_path / "blocks.vtkhdf", [box] * 2, [BOX_FACES] * 2, ["a", "b"], ["", ""])
+    centres = np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]])
+    writer.append(0.0, centres, np.array([np.eye(3), turn]), {})
+    writer.append(1.0, centres + 1.0, np.array([np.eye(3), turn]), {})
+    write_solids(tmp_path / "solids.vtkhdf", [box + np.array([1.0, 1.5, 0.5])], [BOX_FACES])
+    blocks, solids = of_blocks(tmp_path), of_solids(tmp_path)
+    for outline, middle, half in zip(
+        [*blocks, *solids], [(0.5, 0.5), (1.5, 0.5), (1.0, 1.5)], [(0.25, 0.1), (0.1, 0.25), (0.25, 0.1)]
+    ):
+        np.testing.assert_allclose(outline.min(axis=0), np.subtract(middle, half), atol=1e-6)
+        np.testing.assert_allclose(outline.max(axis=0), np.add(middle, half), atol=1e-6)
+    draw(tmp_path, tmp_path / "map.png", "a site")
+    for axis in drawn[0].axes[:4]:
+        shown = [len(c.get_paths()) for c in axis.collections if isinstance(c, PolyCollection)]
+        assert [n for n in shown if n] == [1, 1, 2, 2]
+    (legend,) = drawn[0].legends
+    assert [text.get_text() for text in legend.get_texts()] == ["fixed solids", "blocks at the start"]

@@ -1,4 +1,5 @@
-"""Maps of a flood from a run directory: largest depth, speed and h v², arrival, and the buildings by their state.
+"""Maps of a flood from a run directory: largest depth, speed and h v², arrival, with solids and blocks in outline and
+the buildings by their state.
 
 python -m coupler.commands.view.flood_map RUN PICTURE.png TITLE
 """
@@ -12,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.commands.view.footprints import of_blocks, of_solids
+from coupler.commands.view.palette import INK, PAPER
 from coupler.results.maps import Map, read_map
 
 MAPS = (
@@ -24,6 +27,8 @@ SHOWN = 99.5
 """Percentile of a map at which its colours end; a tip on the bar says that few points are beyond."""
 NOWHERE = "no water", "no dry ground was reached"
 """What a map without a value says, and that of the arrival."""
+FIXED = "#6b6b6b"
+"""Colour of fixed solids, darker than that of dry ground."""
 STATES = {"stands": "#2a9d5c", "damaged": "#f2a73b", "collapsed": "#c8322b"}
 
 
@@ -36,9 +41,9 @@ def draw(run: Path, picture: Path, title: str) -> None:
 
     found = read_map(run / "maps" / "bed.asc")
     x, y, bed = *in_tank(run, found), found.z
-    houses = _buildings(run)
+    houses, blocks, solids = _buildings(run), of_blocks(run), of_solids(run)
     tall = np.ptp(y) / np.ptp(x)
-    figure, axes = plt.subplots(2, 2, figsize=(12.0, 1.4 + 11.0 * min(tall, 1.2)), layout="constrained")
+    figure, axes = plt.subplots(2, 2, figsize=(12.0, 1.9 + 11.0 * min(tall, 1.2)), layout="constrained")
     for axis, (name, label, colours) in zip(axes.flat, MAPS):
         z = read_map(run / "maps" / f"{name}.asc").z
         axis.contourf(x, y, bed, levels=12, cmap="Greys", alpha=0.35)
@@ -51,7 +56,9 @@ def draw(run: Path, picture: Path, title: str) -> None:
         else:
             axis.text(0.5, 0.5, NOWHERE[name == "arrival"], transform=axis.transAxes, ha="center")
         axis.contour(x, y, bed, levels=[0.0], colors="k", linewidths=0.8)
-        for state, colour in STATES.items():
+        _draw_outlines(axis, solids, FIXED, "fixed solids")
+        _draw_outlines(axis, blocks, PAPER, "blocks at the start")
+        for state, colour in STATES.items() if houses else ():
             of_state = [h for h in houses if h["state"] == state]
             places = np.array([(float(h["x"]), float(h["y"])) for h in of_state]).reshape(-1, 2)
             axis.scatter(
@@ -61,6 +68,7 @@ def draw(run: Path, picture: Path, title: str) -> None:
                 c=colour,
                 edgecolors="k",
                 linewidths=0.6,
+                zorder=3,
                 label=f"{state}: {len(places)}",
             )
         axis.set(
@@ -71,10 +79,24 @@ def draw(run: Path, picture: Path, title: str) -> None:
             xlim=(x[0], x[-1]),
             ylim=(y[0], y[-1]),
         )
-    if houses:
-        axes[0, 0].legend(loc="upper left", fontsize=8)
+    if houses or blocks or solids:
+        figure.legend(
+            *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8
+        )
     figure.suptitle(title)
     figure.savefig(picture, dpi=110)
+
+
+def _draw_outlines(axis, outlines: list[np.ndarray], colour: str, label: str) -> None:
+    """Bodies in plan, with a line around all that touch one another and none between them."""
+    from matplotlib.collections import PolyCollection
+
+    if outlines:
+        for fill, width, order in ((INK, 1.4, 2.2), (colour, 0.2, 2.3)):
+            axis.add_collection(
+                PolyCollection(outlines, facecolors=fill, edgecolors=fill, linewidths=width, zorder=order)
+            )
+        axis.plot([], [], "s", color=colour, markeredgecolor=INK, markersize=8, label=label)
 
 
 def in_tank(run: Path, found: Map) -> tuple[np.ndarray, np.ndarray]:
