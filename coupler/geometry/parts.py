@@ -232,15 +232,15 @@ def _arch(spec, common: dict) -> list:
     from yade_scripts.blocks.generators.arch import Arch, abutment_blocks, arch_blocks
 
     arch = Arch(
-        spec.name,
-        np.array(spec.foot),
-        spec.span,
-        spec.span / 2 if spec.rise is None else spec.rise,
-        spec.thickness,
-        spec.width,
-        spec.voussoirs,
-        spec.along,
-        spec.abutment,
+        name=spec.name,
+        foot=np.array(spec.foot),
+        span=spec.span,
+        rise=spec.span / 2 if spec.rise is None else spec.rise,
+        thickness=spec.thickness,
+        width=spec.width,
+        count=spec.voussoirs,
+        along=spec.along,
+        abutment=spec.abutment,
     )
     common = common | {"group": spec.name}
     return arch_blocks(arch, **common) + abutment_blocks(arch, fixed=spec.abutment_fixed, **common)

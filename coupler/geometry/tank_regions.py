@@ -197,4 +197,6 @@ def _near(bodies: list[Body], margin: float, levels: int):
     normals = np.concatenate([body.normals for body in bodies])
     offsets = np.concatenate([(body.vertices @ body.normals.T).max(axis=0) for body in bodies])
     low, high = (np.array([body.bounds()[end] for body in bodies]) for end in (0, 1))
-    return NearBodies(normals, offsets, start, low, high, margin, levels)
+    return NearBodies(
+        normals=normals, offsets=offsets, start=start, lower=low, upper=high, margin=margin, levels=levels
+    )

@@ -83,14 +83,14 @@ def _side(case: Case, side: str, level, speed) -> SideEnergy:
     along, across = (0, 1) if side[0] == "x" else (1, 0)
     gravity = case.case.gravity
     return SideEnergy(
-        level,
-        speed,
-        float(size[across]),
-        floor_along(case.tank, side),
-        _level_at(case, side),
-        case.water.density,
-        gravity,
-        float(size[along]) / math.sqrt(gravity * size[2]) if gravity > 0.0 else 0.0,
+        level=level,
+        speed=speed,
+        width=float(size[across]),
+        floor=floor_along(case.tank, side),
+        start=_level_at(case, side),
+        density=case.water.density,
+        gravity=gravity,
+        crossing=float(size[along]) / math.sqrt(gravity * size[2]) if gravity > 0.0 else 0.0,
     )
 
 

@@ -47,18 +47,18 @@ def output(cells: int, with_openings: bool) -> Output:
     if not with_openings:
         openings = corners = 1
     out = Output(
-        np.empty(parts, dtype=np.int64),
-        np.empty(parts, dtype=np.bool_),
-        np.empty((parts, 10)),
-        np.empty(polygons, dtype=np.int64),
-        np.empty(polygons, dtype=np.int64),
-        np.empty((polygons, 25)),
-        np.empty(openings, dtype=np.int64),
-        np.empty(openings, dtype=np.int64),
-        np.empty(openings + 1, dtype=np.int64),
-        np.empty((corners, 3)),
-        np.empty(tetrahedra, dtype=np.int64),
-        np.empty((tetrahedra, 17)),
+        part_cell=np.empty(parts, dtype=np.int64),
+        part_whole=np.empty(parts, dtype=np.bool_),
+        part_moments=np.empty((parts, 10)),
+        wet_part=np.empty(polygons, dtype=np.int64),
+        wet_body=np.empty(polygons, dtype=np.int64),
+        wet=np.empty((polygons, 25)),
+        open_part=np.empty(openings, dtype=np.int64),
+        open_face=np.empty(openings, dtype=np.int64),
+        open_start=np.empty(openings + 1, dtype=np.int64),
+        open_x=np.empty((corners, 3)),
+        tet_part=np.empty(tetrahedra, dtype=np.int64),
+        tet=np.empty((tetrahedra, 17)),
     )
     out.open_start[0] = 0
     return out
@@ -94,18 +94,18 @@ class Cuts(NamedTuple):
         wet, openings, filled = keep[self.wet_part], keep[self.open_part], keep[self.tet_part]
         length = np.diff(self.open_start)
         return Cuts(
-            self.part_cell[keep],
-            self.part_whole[keep],
-            self.moments[keep],
-            row[self.wet_part[wet]],
-            self.wet_body[wet],
-            self.wet[wet],
-            row[self.open_part[openings]],
-            self.open_face[openings],
-            np.concatenate([[0], np.cumsum(length[openings])]).astype(np.int64),
-            self.open_x[np.repeat(openings, length)],
-            row[self.tet_part[filled]],
-            self.tet[filled],
+            part_cell=self.part_cell[keep],
+            part_whole=self.part_whole[keep],
+            moments=self.moments[keep],
+            wet_part=row[self.wet_part[wet]],
+            wet_body=self.wet_body[wet],
+            wet=self.wet[wet],
+            open_part=row[self.open_part[openings]],
+            open_face=self.open_face[openings],
+            open_start=np.concatenate([[0], np.cumsum(length[openings])]).astype(np.int64),
+            open_x=self.open_x[np.repeat(openings, length)],
+            tet_part=row[self.tet_part[filled]],
+            tet=self.tet[filled],
         )
 
 

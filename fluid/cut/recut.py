@@ -18,18 +18,18 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
     tets = _of_parts(kept, fresh, old.tet_part, new.tet_part)
     start, corner = _ragged(opened, old.open_start, new.open_start)
     return Cuts(
-        _rows(take, old.part_cell, new.part_cell),
-        _rows(take, old.part_whole, new.part_whole),
-        _rows(take, old.moments, new.moments),
-        _rows(wet, kept[old.wet_part], fresh[new.wet_part]),
-        _rows(wet, old.wet_body, new.wet_body),
-        _rows(wet, old.wet, new.wet),
-        _rows(opened, kept[old.open_part], fresh[new.open_part]),
-        _rows(opened, old.open_face, new.open_face),
-        start,
-        _rows(corner, old.open_x, new.open_x),
-        _rows(tets, kept[old.tet_part], fresh[new.tet_part]),
-        _rows(tets, old.tet, new.tet),
+        part_cell=_rows(take, old.part_cell, new.part_cell),
+        part_whole=_rows(take, old.part_whole, new.part_whole),
+        moments=_rows(take, old.moments, new.moments),
+        wet_part=_rows(wet, kept[old.wet_part], fresh[new.wet_part]),
+        wet_body=_rows(wet, old.wet_body, new.wet_body),
+        wet=_rows(wet, old.wet, new.wet),
+        open_part=_rows(opened, kept[old.open_part], fresh[new.open_part]),
+        open_face=_rows(opened, old.open_face, new.open_face),
+        open_start=start,
+        open_x=_rows(corner, old.open_x, new.open_x),
+        tet_part=_rows(tets, kept[old.tet_part], fresh[new.tet_part]),
+        tet=_rows(tets, old.tet, new.tet),
     )
 
 

@@ -91,21 +91,11 @@ def fitted_mesh(
     x, y = _columns(lower, upper, size) if axes is None else (np.asarray(a, float) for a in axes)
     heights = _heights(bed, x, y)
     lid, thin = float(upper[2]), thinnest * size[2]
-    if not heights.min() < lid - NEAREST * thin:
-        raise MeshError(
-            f"the bed is nowhere lower than {lid - NEAREST * thin:g} m, half a cell below the upper side at "
-            f"{lid:g} m: raise upper, or check the datum and the units of the bed"
-        )
-    above = heights > lid - NEAREST * thin
-    lowered = np.minimum(heights, lid - thin)
-    kept = np.where(above, lowered, heights)
+    above = _at_lid(heights, lid, NEAREST * thin)
+    kept = np.where(above, np.minimum(heights, lid - thin), heights)
     used = _used_columns(above)
     steepest, place = _steepest(kept, used, x, y)
-    if steepest > STEEPEST:
-        raise MeshError(
-            f"the bed rises by {steepest:.3g} m per metre between columns at ({place[0]:.4g}, {place[1]:.4g}) m; up to "
-            f"{STEEPEST:g} a mesh can follow it: smooth it, or make what is steeper a solid"
-        )
+    _refuse_steep(steepest, place)
     layer = _layer(kept[used].min(), lid, size[2])
     base = _envelope(np.where(used, kept, np.inf), x, y, follow)
     layers = np.where(used, _squeezed(base, lid, kept[used].min(), layer, thinnest), layer)
@@ -118,18 +108,37 @@ def fitted_mesh(
     on_bed[columns.start[:-1][used.ravel()]] = True
     bed_face = on_bed[mesh.boundary_faces].all(axis=1)
     return FittedMesh(
-        mesh,
-        on_bed,
-        bed_face,
-        x,
-        y,
-        np.where(used, kept, np.nan),
-        layer,
-        steepest,
-        place,
-        int((above & used).sum()),
-        columns.lattice(),
+        mesh=mesh,
+        on_bed=on_bed,
+        bed_face=bed_face,
+        column_x=x,
+        column_y=y,
+        bed=np.where(used, kept, np.nan),
+        layer=layer,
+        steepest=steepest,
+        steepest_at=place,
+        lowered=int((above & used).sum()),
+        lattice=columns.lattice(),
     )
+
+
+def _at_lid(heights, lid: float, nearest: float):
+    """(nx, ny) bool: columns whose bed reaches to within `nearest` [m] of the lid. Raises MeshError if all do."""
+    if not heights.min() < lid - nearest:
+        raise MeshError(
+            f"the bed is nowhere lower than {lid - nearest:g} m, half a cell below the upper side at "
+            f"{lid:g} m: raise upper, or check the datum and the units of the bed"
+        )
+    return heights > lid - nearest
+
+
+def _refuse_steep(steepest: float, place) -> None:
+    """Raises MeshError for a bed that no mesh can follow, with the place (2,) [m] where it is steepest."""
+    if steepest > STEEPEST:
+        raise MeshError(
+            f"the bed rises by {steepest:.3g} m per metre between columns at ({place[0]:.4g}, {place[1]:.4g}) m; up to "
+            f"{STEEPEST:g} a mesh can follow it: smooth it, or make what is steeper a solid"
+        )
 
 
 @dataclass(frozen=True)

@@ -219,7 +219,17 @@ class Viscosity:
         row[wet_cells] = np.arange(len(wet_cells))
         use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))
         hat, arm = (k.hat, k.arm) if self.friction is None else k.rubbing(phi)
-        found = Walls(k.cell, row[k.cell], k.body, k.normal, hat, arm, area, nitsche, drag)
+        found = Walls(
+            cell=k.cell,
+            row=row[k.cell],
+            body=k.body,
+            normal=k.normal,
+            hat=hat,
+            arm=arm,
+            area=area,
+            nitsche=nitsche,
+            drag=drag,
+        )
         return Walls(*(np.ascontiguousarray(a[use]) for a in found))
 
 

@@ -88,16 +88,16 @@ def read_spec(folder: Path) -> Spec:
     try:
         stored = json.loads(read_text(path))
         return Spec(
-            folder.resolve(),
-            stored["title"],
-            Path(stored["case_file"]),
-            Sweep.model_validate(stored["sweep"]),
-            tuple(Column(**{**c, "keys": tuple(c["keys"])}) for c in stored["columns"]),
-            tuple(Row(**row) for row in stored["rows"]),
-            {id: tuple(overrides) for id, overrides in stored["runs"].items()},
-            tuple(stored["remarks"]),
-            stored["threads"],
-            stored["case"],
+            folder=folder.resolve(),
+            title=stored["title"],
+            case_file=Path(stored["case_file"]),
+            sweep=Sweep.model_validate(stored["sweep"]),
+            columns=tuple(Column(**{**c, "keys": tuple(c["keys"])}) for c in stored["columns"]),
+            rows=tuple(Row(**row) for row in stored["rows"]),
+            runs={id: tuple(overrides) for id, overrides in stored["runs"].items()},
+            remarks=tuple(stored["remarks"]),
+            threads=stored["threads"],
+            case=stored["case"],
         )
     except BadPath as error:
         raise NoRun(f"{folder}: not the directory of a sweep: {error}") from error

@@ -154,7 +154,16 @@ def open_run(directory):
         )
     solids, tank, basin = _solids(directory / "solids.vtkhdf")
     bed = _bed(directory)
-    return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times, basin, bed)
+    return RunFiles(
+        directory=directory,
+        water=water,
+        blocks=blocks,
+        solids=solids,
+        tank=tank,
+        times=(water or blocks).times,
+        basin=basin,
+        bed=bed,
+    )
 
 
 def _bed(directory):
