@@ -89,6 +89,10 @@ def test_still_water_on_a_wall():
         (gauge,) = made.gauges
         record = made.coupling.step(0.01)
         (row,) = gauge.read(made.coupling, record)
+        middle = made.coupling.structure.centre()
+        (own,) = BlockLoads(np.array([0]), ["wall"], middle, ["pressure", "weight"]).read(
+            made.coupling, record
+        )
     finally:
         made.coupling.structure.close()
     force = 0.5 * RHO * G * depth**2 * width
@@ -99,6 +103,9 @@ def test_still_water_on_a_wall():
     assert row["weight_force_z"] == pytest.approx(-2400 * 0.15 * 0.3 * 0.6 * G, rel=1e-9)
     assert row["pressure_impulse_x"] == pytest.approx(0.01 * force, rel=1e-5)
     assert row["contact_force_z"] == row["friction_force_x"] == 0.0
+    # the row of a block is about its own centre, half of the wall up, where its weight has no moment
+    assert own["pressure_moment_y"] == pytest.approx(force * (depth / 3 - 0.3), rel=1e-4)
+    assert own["weight_moment_y"] == pytest.approx(0.0, abs=1e-9 * abs(own["weight_force_z"]))
 
 
 def test_rows_of_each_block_hold_the_impulses_of_the_group():

@@ -52,6 +52,13 @@ def test_a_level_surface_that_rises_brings_every_node_what_a_plane_does(place, s
     assert np.abs(along - exact)[near].max() > 0.03 * came
 
 
+@pytest.mark.parametrize(("place", "speed"), [(1.02, -5.0), (0.98, 5.0)], ids=["sinks", "rises"])
+def test_a_level_surface_that_passes_a_layer_of_nodes_within_the_step(place, speed):
+    """Cells beyond that layer, all wet or all dry at the start, are cut by its end."""
+    water, _, found, exact = rising(UPWARDS, speed, place)
+    assert np.abs(found - exact)[beside(water)].max() < 2e-2 * DT * abs(speed) * CELL**2
+
+
 @pytest.mark.parametrize("height", [6.0, 8.0])
 def test_it_is_exact_on_slender_cells(height):
     """Where corners of a cell at the surface are farther from it than three cell sizes, what comes from below counts as

@@ -87,6 +87,17 @@ def test_the_same_seed_gives_the_same_strengths_and_another_seed_others():
     np.testing.assert_allclose(ratio, 27.0 / 4.0, rtol=1e-12)
 
 
+def test_strengths_are_those_of_the_laws_times_the_factors():
+    """Each joint of its own law: the strength scatters and the opening at failure stays, so that stiffness and work of
+    separation scale with the strength."""
+    scatter = Scatter("weibull", 0.4, 5)
+    laws = JointRules(GLUE, (), scatter).scattered([GLUE, BRITTLE, GLUE])
+    for law, of, f in zip(laws, (GLUE, BRITTLE, GLUE), scatter.factors(3)):
+        assert law.strength == f * of.strength
+        assert law.opening_at_failure == of.opening_at_failure
+        assert law.work_of_separation == pytest.approx(f * of.work_of_separation)
+
+
 @pytest.mark.parametrize(("distribution", "variation"), [("weibull", 0.0), ("weibull", 2.0), ("normal", 0.1)])
 def test_impossible_scatter_is_refused(distribution, variation):
     with pytest.raises(JointParameterError, match=r"joints\."):

@@ -2,6 +2,7 @@
 
 import ast
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -89,6 +90,16 @@ def test_an_exponential_cpm_bond_is_taken_out_at_the_share_of_strength_it_says()
     left = made["onset"] / kappa * np.exp(-(kappa - made["onset"]) / made["end"])
     assert 1.0 - left == pytest.approx(made["damage"])
     assert left * made["E"] * kappa == pytest.approx(cpm.LEFT * JOINTS.strength)
+
+
+@pytest.mark.parametrize(("opening", "left"), [(2e-3, 0.25), (-2e-3, 1.0)], ids=["tension", "compression"])
+def test_the_energy_in_a_damaged_cpm_bond_is_half_of_force_times_opening(opening, left):
+    """Three quarters of the stiffness are lost in tension, none in compression; shear keeps its stiffness."""
+    kn, ks, sliding = 4e6, 3e6, 1e-3
+    force, shear = np.array([left * kn * opening, 0.0, 0.0]), np.array([0.0, ks * sliding, 0.0])
+    bond = SimpleNamespace(normalForce=force, shearForce=shear, omega=0.75, epsN=opening, kn=kn, ks=ks)
+    expected = 0.5 * (abs(force[0] * opening) + ks * sliding**2)
+    assert cpm.stored(bond, {}) == pytest.approx(expected)
 
 
 def test_lourenco_envelope_has_three_borders():
