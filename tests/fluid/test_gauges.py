@@ -98,6 +98,16 @@ def test_depth_beside_stacked_blocks_and_over_them():
     np.testing.assert_allclose(depth, [0.27, 0.81, 0.81, 0.81, 0.27], atol=1e-9)
 
 
+@pytest.mark.parametrize("lean", [0.01, -0.01])
+def test_a_line_that_is_nowhere_deep_in_a_leaning_wall_runs_beside_it(lean):
+    """Up to 4 mm behind its faces on either side, less than a twentieth of a cell: as if the wall stood upright. A line
+    that gets 14 mm deep has no water."""
+    wall = ConvexBodies.boxes([[0.5, 0.5, 0.4]], [[0.2, 2.0, 1.2]], [rotation([0, 1, 0], lean)])
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.81, wall)
+    depth = gauges.levels(water, [[0.4, 0.5], [0.6, 0.5], [0.41, 0.5], [0.59, 0.5]])
+    np.testing.assert_allclose(depth, [0.81, 0.81, 0.0, 0.0], atol=1e-9)
+
+
 def test_depth_on_a_solid_over_a_sloping_bed():
     """Down to the bed where the line passes no solid, and from the bed up to one that floats close above it."""
     from fluid.mesh.fitted_mesh import fitted_mesh

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from tests.physics.scenes import RHO, SLICE, G, run, standing_wall
 from tests.physics.test_wall_under_still_water import force_and_arm
@@ -136,6 +137,19 @@ def test_what_hangs_on_a_driven_block_does_not_sleep():
             s.advance(5e-3)
             assert not s.asleep.any()
         assert s.centre()[0, 2] > 0.25 + 2e-5
+
+
+def test_the_slowest_period_is_that_of_the_eigenvalue_problem():
+    """A slab glued to the ground rocks about its foot: its turning takes part in the mode with its own inertia, which
+    makes the period a sixth longer than its mass at its centre alone."""
+    slab = Block("slab", (0, 0, 0.5), size=(0.25, 1.0, 1.0))
+    with Structure([slab], ContactLaw(), LAW, ground=0.0, sleep=SHARE) as s:
+        settle(s)
+        (island,) = s._sleep.islands()
+        mass = np.zeros((6, 6))
+        mass[:3, :3], mass[3:, 3:] = s.mass[0] * np.eye(3), slab.inertia
+        period = 2.0 * np.pi / np.sqrt(eigh(s.tangent()[0].toarray(), mass, eigvals_only=True)[0])
+        assert s._sleep._slowest(island) == pytest.approx(period, rel=1e-2)
 
 
 def test_what_was_displaced_stays_awake_for_a_period():
