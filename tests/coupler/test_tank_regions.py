@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from coupler.checks.read_case import load
+from coupler.geometry.cell_sizes import edges_at, widest_cell
 from coupler.geometry.stretches import graded
 from coupler.geometry.tank_mesh import finest_cell, mesh_of
 from coupler.program.errors import BadCase
@@ -72,6 +73,16 @@ def test_boxes_and_stretches(tmp_path):
     x = np.unique(mesh.nodes[:, 0])
     assert x[-1] - x[-2] == pytest.approx(0.2)
     assert mesh.cell_volume.sum() == pytest.approx(1.6 * 0.4 * 0.8)
+
+
+def test_edges_of_bricks_are_halved_with_each_level(tmp_path):
+    """Two levels in the box, none before it, and slices of 0.2 m at the end, where a body that is thin along x has
+    wider cells across it than one that is thin along y."""
+    tank = loaded(tmp_path, SLICES + BOX).tank
+    places = np.array([[0.8, 0.21, 0.11], [0.21, 0.21, 0.11], [1.55, 0.21, 0.11]])
+    np.testing.assert_allclose(edges_at(tank, places), [[0.025] * 3, [0.1] * 3, [0.2, 0.1, 0.1]], rtol=1e-9)
+    assert widest_cell(tank, places[2:], np.eye(3)[0]) == pytest.approx(0.2)
+    assert widest_cell(tank, places[2:], np.eye(3)[1]) == pytest.approx(0.1)
 
 
 def test_lengths_change_by_the_growth_at_most():
