@@ -4,9 +4,17 @@ Inflow: u and the level are given.  On its nodes u = u_in (all components) and �
 
     q_i = -∮_wet N_i u·n dA,                                                                    (1)
 
-with n outward, joins the mass balance of the pressure, the conservative volume and the ledger.  Where a solid stands in
-the side, the integral is over the part that it leaves open: the faces that its cell's tetrahedra (`fans.py`) have
-there.
+with n outward, joins the conservative volume and the ledger.  Where a solid stands in the side, the integral is over
+the part that it leaves open: the faces that its cell's tetrahedra (`fans.py`) have there.  The mass balance of the
+pressure takes cells that the surface cuts whole, and so it takes their faces,
+
+    q_i = -∮ N_i u·n dA,                                                                        (1a)
+
+as it does with the polygons of bodies: a stream of one velocity then passes the side as it is.  With (1) the uppermost
+wet nodes let out less than such a stream brings; it was dammed up and slowed down there, and since the velocity of the
+side is given, so that it still left with it, it gained up to 3 % of the energy that left.
+Beyond the surface the pressure goes on with the weight, p = -ρ g φ, on the nodes of an inflow: its work is that of a
+pressure that ends at the surface, and not of one that ends at the dry nodes.
 Sea: φ = z - level on its nodes and there
 
     p = ρ g (level - z) - ½ ρ min(u·n, 0)²,    -u·n ≤ sqrt(2 g depth)                           (2)
@@ -62,14 +70,16 @@ class Side:
     """A part of the boundary with its nodes on a domain.
 
     chosen: face normals (B, 3), centres (B, 3) [m] → (B,) bool · flow: Flow, or None for a sea · level(time) [m] ·
-    cell (F,) of each face, corner (F,) of the cell opposite to it, faces (F, 3) its nodes; on a domain a face that a
-    solid cuts is replaced by its open triangles: hats (F, 3, 3), values at each corner (row) of the hats of the nodes,
-    and area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3) outward."""
+    cell (F,) of each face, element (F,) its row on the domain, corner (F,) of the cell opposite to it, faces (F, 3) its
+    nodes; on a domain a face that a solid cuts is replaced by its open triangles: hats (F, 3, 3), values at each corner
+    (row) of the hats of the nodes, and area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3)
+    outward."""
 
     chosen: Callable
     flow: Flow | None
     level: Callable
     cell: Ints
+    element: Ints
     corner: Ints
     faces: Ints
     hats: Floats
@@ -96,6 +106,7 @@ class Side:
             flow=flow,
             level=flow.level if flow else cast("Callable", level),
             cell=cell,
+            element=cell,
             corner=corner,
             faces=faces_of(mesh.cells[cell], corner),
             hats=np.broadcast_to(np.eye(3), (len(cell), 3, 3)),
@@ -117,6 +128,7 @@ class Side:
         return replace(
             self,
             cell=self.cell[face[kept]],
+            element=element[kept],
             corner=self.corner[face[kept]],
             faces=faces[kept],
             hats=hats[kept],
@@ -156,8 +168,16 @@ class Side:
 
     def rate(self, phi, u):
         """q (N,) [m³/s] of equation (1), the inflow at each node; phi (N,), u (N, 3) [m/s]."""
-        q = np.zeros(len(phi))
-        wet = wet_shares(np.einsum("fca,fa->fc", self.hats, phi[self.faces]))
+        return self._rate(u, wet_shares(np.einsum("fca,fa->fc", self.hats, phi[self.faces])))
+
+    def drive(self, u, void):
+        """q (N,) [m³/s] of equation (1a), with the faces of all cells but the listed ones (k,); u (N, 3) [m/s]."""
+        counted = ~np.isin(self.element, void)
+        return self._rate(u, np.repeat(counted[:, None] / 3.0, 3, axis=1))
+
+    def _rate(self, u, wet):
+        """q (N,) [m³/s] with ∫ N_a dA over what counts of each triangle, wet (F, 3), over its area."""
+        q = np.zeros(len(u))
         share = np.einsum("fca,fc->fa", self.hats, wet)
         inward = -np.einsum("fak,fk->fa", u[self.faces], self.area)
         np.add.at(q, self.faces, share * inward)
@@ -239,9 +259,17 @@ class Sides:
 
     def through(self, phi, u, dt: float, carried):
         """Volume (N,) [m³] that enters at the inflows over dt [s] (negative: leaves, at most the water carried (N,)
-        [m³]), and its rate (N,) [m³/s], which the pressure equation needs."""
-        rate = self.flow_rate(phi, u)
-        return np.maximum(dt * rate, -np.maximum(carried, 0.0)), rate
+        [m³])."""
+        return np.maximum(dt * self.flow_rate(phi, u), -np.maximum(carried, 0.0))
+
+    def drive(self, u, void):
+        """q (N,) [m³/s] of equation (1a) at the inflows, for the mass balance of the pressure, which leaves out the
+        cells `void` (k,); u (N, 3) [m/s]."""
+        rate = np.zeros(len(u))
+        for side in self.now:
+            if not side.is_sea:
+                rate += side.drive(u, void)
+        return rate
 
     def flow_rate(self, phi, u):
         """q (N,) [m³/s] of equation (1) at the nodes of the inflows; phi (N,), u (N, 3) [m/s]."""
@@ -271,11 +299,15 @@ class Sides:
                 q += side.rate(phi, u)
         return q
 
-    def add_step(self, volume, head, ahead) -> None:
+    def add_step(self, volume, head, phi, weight, ahead) -> None:
         """Add the water that entered at the nodes in a step to the totals.
 
-        volume (N,) [m³] · head (N,) [J/m³]: its energy and pressure · ahead [J]: work of the pressure of seas beyond
-        it, equation (3)."""
+        volume (N,) [m³] · head (N,) [J/m³]: its energy and pressure, continued in place with the weight ρ g [N/m³]
+        beyond the surface of φ (N,) [m] at the inflows · ahead [J]: work of the pressure of seas beyond it, equation
+        (3)."""
+        dry = self.flowing()
+        dry = dry[phi[dry] > 0.0]
+        head[dry] -= weight * phi[dry]
         self.entered += float(volume[volume > 0.0].sum())
         self.left -= float(volume[volume < 0.0].sum())
         self.energy += float(volume @ head) + ahead

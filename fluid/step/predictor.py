@@ -102,8 +102,7 @@ class Moved:
     """What transport, sides, volume and shear of a step have found before its pressure problem is set up.
 
     surface: VolumeCorrection · conserved_volume [m³] · advected, u_star (N, 3) [m/s], shear, left, through, displaced,
-    in_films, crossing, on_walls, in_jumps: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity,
-    None without any."""
+    in_films, crossing, on_walls, in_jumps: as in `Predicted`."""
 
     surface: VolumeCorrection
     conserved_volume: float
@@ -112,7 +111,6 @@ class Moved:
     shear: ViscousChange | None
     left: Outflow | None
     through: Floats | None
-    inflow_rate: Floats | None
     displaced: Floats
     in_films: tuple[float, float]
     crossing: float
@@ -131,12 +129,12 @@ def predicted(water, dt: float) -> PressureProblem:
     if left is not None:
         carried -= left.volume
         conserved -= float(left.volume.sum())
-    through = inflow_rate = None
+    through = None
     if water.sides is not None:
         water.sides.surface(phi, water.time + dt)
         u_now = water.velocity.copy()
         water.hold(u_now, water.time + dt)
-        through, inflow_rate = water.sides.through(phi, u_now, dt, carried)
+        through = water.sides.through(phi, u_now, dt, carried)
         carried += through
         conserved += float(through.sum())
     displaced = water.displacement(dt)
@@ -192,7 +190,6 @@ def predicted(water, dt: float) -> PressureProblem:
         shear=shear,
         left=left,
         through=through,
-        inflow_rate=inflow_rate,
         displaced=displaced,
         in_films=in_films,
         crossing=crossing,
@@ -291,7 +288,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     if held_back is not None:
         rhs[dofs] += held_back
     if water.sides is not None:
-        rhs += moved.inflow_rate
+        rhs += water.sides.drive(moved.advected, part.void)
         gravity = water.parameters.gravity
         held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
         # at the edge that a sea shares with an inflow the pressure is sought, not held

@@ -249,7 +249,9 @@ class Water:
             if self.sides is not None:
                 ahead = late * float((through - before[1]) @ self.pressure)
         if self.sides is not None:
-            self.sides.add_step(problem.predicted.through, self.head(), ahead + given)
+            weight = self.parameters.density * self.parameters.gravity
+            through = problem.predicted.through
+            self.sides.add_step(through, self.head(), self.level_set, weight, ahead + given)
         self.time += problem.dt
         self.steps += 1
         self._domain_is_new, self.renumbered, self.left_behind = False, None, None

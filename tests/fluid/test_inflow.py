@@ -14,6 +14,7 @@ from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
 from fluid.readings import gauges
 from fluid.sides import waves
+from fluid.sides.absorbing import Absorber
 from fluid.sides.inflow import Side, Sides, wet_shares
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
@@ -72,6 +73,55 @@ def test_still_water_in_the_corner_of_an_inflow_and_a_sea_stays():
     deep = water.level_set < 0.0
     depth = level - water.topology.nodes[deep, 2]
     np.testing.assert_allclose(water.pressure[deep], 1000.0 * G * depth, atol=1e-4)
+
+
+@pytest.mark.parametrize("level", [0.502, 0.537, 0.58])
+def test_a_stream_of_one_velocity_passes_the_sides_as_it_is(level):
+    """An exact state, with the surface anywhere between layers of nodes.  The mass balance of the pressure takes cells
+    that the surface cuts whole; with the wet part of their faces alone the side that it leaves through dammed it up at
+    its surface, by 0.22 m/s, and what it then gained was as much as what left.  The pressure that drives it out ends at
+    the surface: with that at the uppermost wet nodes alone it takes up to 0.3 J with it that it never had."""
+    mesh = box_mesh(np.zeros(3), [1, 0.2, 1], 0.1)
+    sides = Sides(
+        [
+            Side.of(mesh, left, waves.steady([1, 0, 0], level, 0.5)),
+            Side.of(mesh, right, waves.steady([-1, 0, 0], level, -0.5)),
+        ]
+    )
+    speed = np.tile([0.5, 0.0, 0.0], (len(mesh.nodes), 1))
+    domain = cut_domain(mesh, ConvexBodies.empty())
+    water = Water(mesh, domain, lambda x: x[:, 2] - level, WaterParameters(), sides=sides, velocity=speed)
+    start = water.kinetic_energy() + water.potential_energy()
+    for _ in range(30):
+        advance(water, 0.02)
+    in_water = water.velocity[water.level_set < 0.0]
+    np.testing.assert_allclose(in_water, np.tile(speed[0], (len(in_water), 1)), atol=1e-9)
+    assert water.kinetic_energy() + water.potential_energy() == pytest.approx(start, rel=1e-9)
+    assert abs(sides.energy) < 1e-6
+
+
+@pytest.mark.parametrize("step", [np.inf, 0.02])
+def test_water_that_runs_out_through_a_side_that_absorbs_does_not_gain(step):
+    """1.1 m of water beside a side with 0.68 m, once the stream is steady there: what is left in the channel is what
+    was there less what the side has taken, but for what a stream loses.  It gained 1.4 % of what left, and 3.1 % in
+    steps of a third."""
+    cell = 0.38
+    mesh = box_mesh(np.zeros(3), np.array([52, 1, 4]) * cell, cell)
+    absorber = Absorber(
+        waves.steady([-1, 0, 0], 0.68, 0.0), -np.eye(3)[0], np.array([[51, 0.5]]) * cell, np.zeros(1), G
+    )
+    sides = Sides([Side.of(mesh, right, absorber.as_flow())])
+    domain = cut_domain(mesh, ConvexBodies.empty())
+    water = Water(mesh, domain, lambda x: x[:, 2] - 1.1, WaterParameters(), sides=sides)
+    while water.time < 2.0:
+        advance(water, min(step, water.stable_step()))
+    start, left_before = water.kinetic_energy() + water.potential_energy(), sides.energy
+    while water.time < 3.0:
+        advance(water, min(step, water.stable_step()))
+    left_now = left_before - sides.energy
+    kept = water.kinetic_energy() + water.potential_energy() - start + left_now
+    assert left_now > 1000.0
+    assert -0.01 * left_now < kept < 0.001 * left_now
 
 
 @pytest.mark.parametrize("covers", ["single", "multiple"])
@@ -277,21 +327,22 @@ def test_the_tail_of_a_solitary_wave_falls_off_at_the_rate_of_its_celerity():
 
 
 def test_solitary_wave_keeps_height_and_speed():
-    """Sent in through a side, H/d = 0.2: after 5 depths still its height and its celerity, to the coarse cells d/10: it
-    is 1 % too high and 3.04 % too slow."""
+    """Sent in through a side, H/d = 0.2: from 8 to 13 depths on its height and its celerity, to the coarse cells d/10:
+    it is 5 % too high and 0.7 % too slow. (On its first five depths it is 3 % too slow, on cells d/20 as well: it has
+    yet to form.)"""
     depth, height = 1.0, 0.2
     wave = waves.SolitaryWave(depth, height, G, 1.5)
     water = tank(
-        [12, 0.1, 1.4], 0.1, lambda x: x[:, 2] - depth, inflow=wave.flow([1, 0, 0], 0.0), density=1000.0
+        [16, 0.1, 1.4], 0.1, lambda x: x[:, 2] - depth, inflow=wave.flow([1, 0, 0], 0.0), density=1000.0
     )
-    places, rows = (2.0, 7.0), []
-    while water.time < 4.2:
+    places, rows = (8.0, 13.0), []
+    while water.time < 6.0:
         advance(water, rtol=1e-7)
         rows.append([water.time, *(gauges.level(water, (x, 0.05)) - depth for x in places)])
     t, first, second = np.array(rows).T
     half = [np.interp(0.5 * height, eta[: eta.argmax()], t[: eta.argmax()]) for eta in (first, second)]
     assert second.max() == pytest.approx(height, rel=0.12)
-    assert 5.0 / (half[1] - half[0]) == pytest.approx(wave.speed, rel=0.032)
+    assert 5.0 / (half[1] - half[0]) == pytest.approx(wave.speed, rel=0.01)
 
 
 @given(hnp.arrays(float, (1, 3), elements=st.floats(-1, 1).filter(lambda v: abs(v) > 1e-6)))
