@@ -122,7 +122,7 @@ def predicted(water, dt: float) -> PressureProblem:
     """Carry out the step up to the pressure solve; reads the state of `water`."""
     crossing, parameters = speeds.crossing(water), water.parameters
     theta, kick = speeds.theta(water, dt, crossing), water.kick_factor(crossing)
-    u_adv, phi = _transported(water, dt, theta, kick)
+    u_adv, phi = _transported(water, dt, theta, kick, crossing)
     found = carried_by_fluxes(water, dt, theta, kick)
     carried = copied(found.water) if is_nothing(found.swept) else added(found.water, found.swept)
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
@@ -214,8 +214,8 @@ def _fallen(first, last, u, gained, active, out):
             out[i, k] = u[i, k] + gained[k] if active[i] else 0.0
 
 
-def _transported(water, dt, theta, kick):
-    """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
+def _transported(water, dt, theta, kick, crossing):
+    """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ. crossing [m/s]: `speeds.crossing`."""
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
     u_hat, u_m = kicked(water.velocity, water.acceleration, kick, 1.0, (1.0 - theta) * dt, to_middle)
     wet = water.walls.wet(water.level_set)
@@ -232,7 +232,7 @@ def _transported(water, dt, theta, kick):
             water.topology, water.listed, dt, u_m, phi, water.topology.node_size
         )
         moved[places, 3] = levels
-    if water.parameters.viscosity > 0.0:
+    if water.parameters.viscosity > 0.0 or share_of_fast(speeds.in_waves(water, crossing)) > 0.0:
         from fluid.transport.landing import gained
 
         more, places = gained(water, dt, u_m, water.level_set)
