@@ -6,6 +6,7 @@ import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import annotated_types
 from pydantic import BaseModel
@@ -46,17 +47,20 @@ def sections_of(annotation: object) -> tuple[type[BaseModel], ...]:
     return tuple(found)
 
 
-def keys(section: type[BaseModel] = Case, above: str = "") -> Iterator[Key]:
-    """Every key below a section, in the order of the schema, each section before what is in it."""
+@cache
+def keys(section: type[BaseModel] = Case, above: str = "") -> tuple[Key, ...]:
+    """Every key below a section, in the order of the schema, each section before what is in it.
+
+    Kept, since the schema is fixed: every case of a sweep or study has its names compared with them."""
+    found: list[Key] = []
     for name, field in section.model_fields.items():
         key = _key(f"{above}{name}", field)
-        yield key
-        seen = set()
+        below: dict[str, Key] = {}  # of a name that several kinds of a section have, the first
         for inner in key.sections:
-            for below in keys(inner, f"{key.path}."):
-                if below.path not in seen:
-                    seen.add(below.path)
-                    yield below
+            for one in keys(inner, f"{key.path}."):
+                below.setdefault(one.path, one)
+        found += [key, *below.values()]
+    return tuple(found)
 
 
 def find(path: tuple[str | int, ...]) -> Key | None:
