@@ -59,13 +59,17 @@ def said(*words):
 
 
 @pytest.mark.parametrize("text", [WATER, WATER + BLOCK], ids=["water", "water and a block"])
-def test_the_memory_that_is_forecast_is_what_a_run_takes(tmp_path, text):
-    """Within a quarter, small scenes: that is the programs and their kernels, written fields included.
+def test_the_memory_and_the_disk_that_are_forecast_are_what_a_run_takes(tmp_path, text):
+    """Within a quarter, small scenes: memory is that of the programs and their kernels, the disk holds two checkpoints
+    above all, three states and the histories.
 
     The first of the two runs compiles what is not compiled yet, which takes a gigabyte more."""
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     assert said("run", tmp_path).returncode == 0
-    forecast = float(re.search(r"memory +([\d.]+) MB", said("check", tmp_path).stdout).group(1))
+    checked = said("check", tmp_path).stdout
+    forecast, disk = (float(re.search(rf"{name} +([\d.]+) MB", checked)[1]) for name in ("memory", "disk"))
+    written = sum(path.stat().st_size for path in (tmp_path / "runs").rglob("*") if path.is_file())
+    assert disk == pytest.approx(written / 1e6, rel=0.25)
     run = subprocess.run(
         [sys.executable, "-c", PEAK, *COMMAND, "run", tmp_path], capture_output=True, text=True
     )
