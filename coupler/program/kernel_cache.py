@@ -25,6 +25,9 @@ from coupler.program.errors import SurgebreakError
 from coupler.program.provenance import ROOT
 
 ROOMS = ("fluid", "yade_scripts", "coupler", "kernels")
+TESTS = "tests"
+"""Kernels in tests call those of the program, so they too are kept by the content of all that they import; by numba's
+own key, the file of the test, a test would go on with the code from before a change."""
 KEPT = 8  # states of a module: those of the last few versions, or of checkouts side by side
 NUMBA_S_OWN = "UserProvidedCacheLocator"  # for functions in other files, such as laws from elsewhere
 
@@ -99,7 +102,7 @@ class ByContent:
 def folder_of(py_file: Path, place: Path) -> Path | None:
     """Where kernels of a module are kept below a place; None for a file outside of the packages of kernels."""
     source = py_file.resolve()
-    if not (source.is_relative_to(ROOT) and source.relative_to(ROOT).parts[0] in ROOMS):
+    if not (source.is_relative_to(ROOT) and source.relative_to(ROOT).parts[0] in (*ROOMS, TESTS)):
         return None
     digest = hashlib.sha256()
     for path in sorted(_with_imports(source)):  # with names: numba imports the module of a kernel by its name
@@ -157,7 +160,7 @@ def _imports(path: Path) -> tuple[Path, ...]:
     files = []
     for module, within, listed, whole in _IMPORT.findall(_code(path)):
         dotted = module or whole
-        if dotted.split(".")[0] in ROOMS:
+        if dotted.split(".")[0] in (*ROOMS, TESTS):
             base = ROOT.joinpath(*dotted.split("."))
             names = re.findall(r"\w+", within or listed)
             files += [base.with_suffix(".py"), base / "__init__.py"]

@@ -118,6 +118,16 @@ def test_an_edit_compiles_again_what_imports_it_and_nothing_else(checkout, edite
     assert {file for file in kernels if folder(file) != before[file]} == anew
 
 
+def test_a_kernel_of_a_test_is_compiled_anew_with_what_it_calls(checkout):
+    """Kept by the test's own file alone, `squared_distance` could be made wrong, and the tests that call it from a
+    kernel of their own passed with the code from before, wherever they had run once."""
+    own = {"tests/fluid/test_signs.py": "from fluid.signs import plus\n"}
+    before = checkout("here", **own)("tests/fluid/test_signs.py")
+    assert checkout("here", **own)("tests/fluid/test_signs.py") == before
+    changed = own | {"fluid/signs.py": "edited = 1\n"}
+    assert checkout("here", **changed)("tests/fluid/test_signs.py") != before
+
+
 KERNELS = '''\
 """Sums."""
 
