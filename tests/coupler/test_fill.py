@@ -1,10 +1,12 @@
 """Where the water stands at the start, from boxes of a case."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from coupler.geometry.start_surfaces import StartSurface
-from coupler.scene.fill import merged, start_level, start_velocity
+from coupler.scene.fill import _side, merged, start_level, start_velocity
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
@@ -31,6 +33,17 @@ def test_boxes_that_touch_are_one_pool(seam):
     for _ in range(10):
         advance(water)
     assert np.abs(water.velocity).max() < 1e-9
+
+
+def test_a_sliver_beside_a_solid_counts_to_the_side_on_which_it_mostly_lies():
+    """Nodes whose cells a solid leaves next to nothing on either side of the surface, more below it or more above."""
+    faces = SimpleNamespace(
+        edge=np.full(2, CELL), at_water_line=lambda ending, *_: np.zeros(len(ending), bool)
+    )
+    low, high, cut = np.array([-2e-6, -1e-6]) * CELL, np.array([1e-6, 2e-6]) * CELL, np.ones(2, bool)
+    below, above = _side(np.zeros(2), low, high, cut, cut, faces)
+    assert below == -np.inf
+    assert above > 0.0
 
 
 def test_a_tank_full_of_water_has_no_surface():

@@ -8,7 +8,7 @@ import pytest
 from coupler.case.case import Case
 from coupler.checks.case import problems
 from coupler.results.loads import BlockLoads, GroupLoads, loads
-from coupler.run.run import load_of_what_moves
+from coupler.run.run import ARRIVED, _has_arrived, load_of_what_moves
 from coupler.scene.build import build
 from tests.coupler.test_momentum import run, scene
 from tests.fakes import no_clock
@@ -200,3 +200,19 @@ def test_the_largest_force_of_a_run_is_that_on_what_can_move():
     )
     nothing = SimpleNamespace(load=np.zeros((0, 6)))
     np.testing.assert_array_equal(load_of_what_moves(house, nothing), np.zeros(3))
+
+
+@pytest.mark.parametrize(("force", "arrived"), [(0.9, False), (1.1, True)])
+def test_water_has_arrived_once_it_pushes_a_thousandth_of_the_weight_of_what_can_move(force, arrived):
+    """A held quay of a hundred times that weight has no part in it; nor has water that wets no block."""
+    weight = ARRIVED * 500.0 * G
+    structure = SimpleNamespace(
+        mass=np.array([500.0, 5e4]), fixed=np.array([False, True]), gravity=np.array([0.0, 0.0, -G])
+    )
+    record = SimpleNamespace(
+        load=np.array([[force * weight, 0, 0, 0, 0, 0], [1e6, 0, 0, 0, 0, 0]]), wetted=True
+    )
+    coupling = SimpleNamespace(structure=structure)
+    assert _has_arrived(coupling, record) == arrived
+    record.wetted = False
+    assert not _has_arrived(coupling, record)

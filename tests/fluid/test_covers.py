@@ -7,9 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.continued_nodes import pick_old_cells
+from fluid.domain.continued_nodes import blocked, pick_old_cells
 from fluid.domain.covers import Connection, components
 from fluid.domain.physical_domain import carry, cut_domain
+from kernels.decorators import plain
 from tests.fluid.test_thin_walls import BOX, MESH, H
 
 SHARP = Connection(inner=0.1, face=0.2)
@@ -22,6 +23,27 @@ def test_blocks_that_meet_along_an_edge_separate_the_water():
         bodies = ConvexBodies.boxes([[x - 1, y + 1, 0.5], [x + 1, y - 1, 0.5]], [[2, 2, 4], [2, 2, 4]])
         domain = cut_domain(BOX, bodies, "multiple")
         assert components(domain.cells, len(domain.nodes)).max() == 1
+
+
+@plain
+def _blocked(a, b, planes):
+    """`blocked`, which only kernels can call."""
+    return blocked(a, b, planes.normal, planes.offset, planes.start[0], planes.start[1])
+
+
+def test_a_segment_is_blocked_where_points_of_it_lie_in_the_body():
+    """Segments of random ends past, through, into and inside of a turned box, against 2000 points of each; those that
+    only graze it are left out."""
+    rng, seen = np.random.default_rng(8), set()
+    turn = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
+    planes = ConvexBodies.boxes([[0.5, 0.5, 0.5]], [[0.7, 0.3, 0.2]], [turn]).planes()
+    for a, b in rng.uniform(0.0, 1.0, (300, 2, 3)):
+        points = a + np.linspace(0.0, 1.0, 2000)[:, None] * (b - a)
+        deepest = (points @ planes.normal.T - planes.offset).max(axis=1).min()
+        if abs(deepest) > 1e-3:
+            assert _blocked(a, b, planes) == (deepest < 0.0)
+            seen.add(bool(deepest < 0.0))
+    assert seen == {True, False}
 
 
 def test_door_connects_and_slit_depends_on_the_thresholds():

@@ -8,6 +8,7 @@ from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.joints.forces import rubbing
 
 STILL = (0.0, 0.0, 0.0)
 MU, PRESSED, SPEED = 0.4, 2e-5, 1e-3
@@ -53,6 +54,19 @@ def test_shear_is_the_law_where_it_holds_and_friction_where_it_has_failed(law):
         assert balance(end) == pytest.approx(balance(start), abs=2e-3 * end["driving_work"])
         assert end["joint_dissipated"] == pytest.approx(s.law_dissipation(), abs=0.01 * end["driving_work"])
         assert s.tangent()[0].toarray()[6, 6] > 0.9 * k * area
+
+
+@pytest.mark.parametrize("sliding", [0.5, 1.5, 20.0])
+def test_friction_and_spring_take_the_work_of_one_long_substep(sliding):
+    """A spring at half of its limit slides on by a multiple of what it stretches at most: the mean of its traction
+    before and after, times the way, is what the spring gains and what friction takes, however long the substep."""
+    k, limit = 1e9, 4e4
+    start, way = 0.5 * limit / k, sliding * limit / k
+    traction, taken = rubbing((start + way, 0.0, 0.0), (0.0, 0.0, 0.0), k, limit, (way, 0.0, 0.0))
+    assert traction[0] == pytest.approx(min(limit, k * (start + way)))
+    gained = (traction[0] ** 2 - (k * start) ** 2) / (2.0 * k)
+    work = 0.5 * (k * start + traction[0]) * way
+    assert gained + taken == pytest.approx(work)
 
 
 def test_without_friction_failed_points_slide_freely():
