@@ -54,3 +54,15 @@ def test_files_that_recipes_name_are_there(name):
     named = re.findall(r"`((?:coupler|fluid|yade_scripts|tests|docs|cases)/[\w/.]*)`", text)
     assert named
     assert [path for path in named if not (ROOT / path.replace("NAME", "__init__")).exists()] == []
+
+
+def test_equations_that_are_referred_to_are_there():
+    """Those of theory.md, each once: in the page itself, and where code names one as "theory (9)"."""
+    theory = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    numbers = [*re.findall(r"\\tag\{(\w+)\}", theory), "4"]  # (4) stands in the table of laws
+    assert len(numbers) == len(set(numbers)) > 30
+    named = set(re.findall(r"(?<![\w$\\{^])\((\d{1,2}[a-k]?)\)", theory))
+    for room in ("coupler", "fluid", "yade_scripts"):
+        for file in (ROOT / room).rglob("*.py"):
+            named |= set(re.findall(r"\btheory \((\d+\w?)\)", file.read_text(encoding="utf-8")))
+    assert named - set(numbers) == set()
