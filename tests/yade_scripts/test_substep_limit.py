@@ -19,6 +19,7 @@ from yade_scripts.dynamics.timestep import (
     exact_joint_frequency,
 )
 from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.joints.rules import JointRules, PairJoints
 
 STILL = (0.0, 0.0, 0.0)
 JOINT = JointParameters(1e6, 1e-3, damping=0.0)
@@ -121,6 +122,16 @@ def test_a_driven_block_opens_no_joint_by_more_than_a_share_of_its_opening_in_a_
         limit = s.substep_limit()
         assert limit.dt == pytest.approx(DRIVEN_SHARE * JOINT.opening_at_failure / speed)
         assert "prescribed motion of block high" in limit.what
+
+
+def test_the_most_brittle_joint_limits_the_substep_of_a_driven_block():
+    """Glued to the ground by one law and to each other by one that fails at a fifth of its opening."""
+    brittle = replace(JOINT, opening_at_failure=2e-4)
+    rules = JointRules(JOINT, (PairJoints("low", "high", brittle),))
+    with Structure(
+        two_cubes(driven=True, velocity=(0, 0, 50.0)), None, rules, ground=0.0, gravity=STILL
+    ) as s:
+        assert s.substep_limit().dt == pytest.approx(DRIVEN_SHARE * 2e-4 / 50.0)
 
 
 K = 1e7
