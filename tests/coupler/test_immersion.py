@@ -1,7 +1,10 @@
 """Blocks as the water sees them: faces that joints seal reach over the gap between the blocks."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from coupler.step.immersion import STILL, Immersion
 from fluid.mesh.background import box_mesh
@@ -129,3 +132,23 @@ def test_a_slice_closes_the_tank_by_the_cells_around_it(top):
     block = Block("slice", (1.0, 0.5, 0.25), size=(0.5, 1.0 - 2.0 * gap, 0.5))
     axes = np.arange(0.0, 2.01, CELL), np.arange(0.0, 1.01, CELL), top
     assert (growths(axes, block, ContactLaw(1e6))[2:4] > gap).all()
+
+
+def test_places_of_an_uplift_turn_with_their_block():
+    """Where a joint lets a share of the pressure in is known in the frame of the block when it was last cut."""
+    quarter = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi]).as_matrix()
+    shares = np.array([0]), np.array([1]), np.array([[0.2, 0.0, -0.1]]), np.array([0.4])
+    of = SimpleNamespace(
+        structure=SimpleNamespace(
+            blocks=[Block("b", (1.0, 2.0, 3.0), size=0.4)], uplift_shares=lambda: shares
+        ),
+        n_solids=1,
+        _centre=np.array([[1.0, 2.0, 3.0]]),
+        _rotation=quarter[None],
+        _reference=SimpleNamespace(plane_start=np.array([0, 6])),
+    )
+    loose, wet = Immersion.films(of)
+    assert loose.tolist() == [True, False]
+    _, place, share = wet
+    np.testing.assert_allclose(place, [[1.0, 2.2, 2.9]])
+    np.testing.assert_array_equal(share, [0.4])
