@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from itertools import chain
+from itertools import chain, repeat
 from operator import attrgetter
 
 import numpy as np
@@ -33,6 +33,9 @@ _SAVED = [0, 1, 2, 12, 9, 10, 11, 3, 4, 5, 6, 7, 8]
 """Of these, in the order of a saved state: position, orientation (w x y z), velocity, spin."""
 _FORCES, _MOMENTS = struct.Struct("3d24x").iter_unpack, struct.Struct("24x3d").iter_unpack
 """Rows [force, moment] as tuples of the one and of the other, sooner than NumPy makes lists of them."""
+
+_FOR_THIS_STEP = repeat(False)
+"""That forces are not permanent, which YADE takes sooner than it finds that nothing was said."""
 
 _ENDS = attrgetter("id1", "id2")
 
@@ -148,8 +151,8 @@ class Scene:
         YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
         forces = self.O.forces
         F = np.ascontiguousarray(F)
-        deque(map(forces.addF, ids, _FORCES(F)), maxlen=0)
-        deque(map(forces.addT, ids, _MOMENTS(F)), maxlen=0)
+        deque(map(forces.addF, ids, _FORCES(F), _FOR_THIS_STEP), maxlen=0)
+        deque(map(forces.addT, ids, _MOMENTS(F), _FOR_THIS_STEP), maxlen=0)
         self.O.dt = dt
         self._spin_is_read[:] = False
         self.O.step()
