@@ -138,7 +138,7 @@ class SweepQuantity(Section):
 
     name: Name = Field(description="of its column", examples=["depth"])
     what: str = Field("", description="the same for people; absent: the name")
-    unit: str = Field("", description="of the number, for tables and figures")
+    unit: str = Field("", description="of the number, for tables and figures; absent: that of the column")
     table: str | None = Field(
         None, description="history table in the run directory", examples=["history/gauges.csv"]
     )

@@ -74,3 +74,11 @@ def length(metres: float | None) -> str:
     if metres is None or not metres >= 0.1:
         return quantity(metres, "m")
     return f"{metres:.3g} m" if metres < 1000.0 else f"{metres:.0f} m"
+
+
+def as_said(value: float | None, unit: str) -> str:
+    """A number with its unit as people say it beside others of its kind: lengths in m and times in s from where these
+    have digits, everything else with a prefix."""
+    if unit == "m":
+        return length(value)
+    return moment_of(value) if unit == "s" else quantity(value, unit)

@@ -6,6 +6,7 @@ import pytest
 from coupler.case.sweep import SweepQuantity
 from coupler.commands.sweep.quantities import read_quantity
 from coupler.results.fields import BlockWriter
+from coupler.results.history import HistoryTable
 from coupler.run.directory import write_json
 from yade_scripts.blocks.generators.column import column_of_boxes
 from yade_scripts.blocks.generators.wall import wall_of_blocks
@@ -108,3 +109,24 @@ def test_only_level_ground_stands_still_under_a_column(tmp_path, case, wanted):
     column = column_of_boxes("c", (0, 0, 0), (0.3, 0.3, 0.6), 3)
     found = drift(tmp_path, {"c": column}, sheared, case, lower=0.0, upper=0.6)
     assert found == pytest.approx(0.1 * wanted, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("take", "unit"), [("max", "N"), ("last", "N"), ("integral", "N s"), ("arrival", "s"), ("period", "s")]
+)
+def test_a_quantity_has_the_unit_of_its_column_unless_another_is_given(tmp_path, take, unit):
+    """Axes of figures and tables of a sweep gave forces as bare numbers."""
+    (tmp_path / "history").mkdir()
+    columns = [("time", "s", ""), ("pier_force_x", "N", ""), ("rate", "m3/s", ""), ("damage", "1", "")]
+    with HistoryTable(tmp_path / "history" / "gauges.csv", columns) as table:
+        for k in range(5):
+            table.append(time=float(k), pier_force_x=(-1.0) ** k, rate=1.0, damage=0.1 * k)
+
+    def found(column, **more):
+        given = {"table": "history/gauges.csv", "column": column, "take": take}
+        return read_quantity(tmp_path, SweepQuantity(name="q", **given, **more)).unit
+
+    more = {"arrival": {"above": 0.5}, "integral": {"window": (0.0, 4.0)}}.get(take, {})
+    assert found("pier_force_x", **more) == unit
+    assert found("rate", **more) == {"N": "m3/s", "N s": "m3", "s": "s"}[unit]
+    assert found("damage", **more) == {"N": "1", "N s": "s", "s": "s"}[unit]

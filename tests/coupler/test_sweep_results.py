@@ -43,7 +43,6 @@ median = "1 MPa"
 dispersion = 0.4
 [[sweep.quantity]]
 name = "peak"
-unit = "N"
 table = "history/gauges.csv"
 column = "value"
 take = "max"
@@ -160,6 +159,7 @@ def test_pandas_reads_the_same_table_with_units(made):
     frame, stored = open_sweep(spec.folder), pd.read_parquet(spec.folder / "table.parquet")
     pd.testing.assert_frame_equal(frame, stored)
     assert frame.attrs["units"]["strength"] == stored.attrs["units"]["strength"] == "Pa"
+    assert frame.attrs["units"]["peak"] == "N", "it gives none: that of its column"
     assert frame.groupby("load").size().tolist() == [6] * 8
 
 
@@ -328,6 +328,24 @@ def test_a_quantity_that_runs_do_not_have_is_reported_with_the_reason(made, caps
     (place / "run.json").write_text(json.dumps(summary))
     why = read_quantity(place, spec.sweep.quantity[0]).why
     assert why == "peak: figure 'cost' of run.json is no number; there are cost.water"
+
+
+def test_a_reason_that_runs_share_is_told_once_in_full_and_values_with_their_units(made, capsys):
+    """Three hundred letters for each wall that could not stand hid the lines of those that did."""
+    ends = {
+        k: ("diverged", ExitCode.DIVERGED, f"energy off: {k} % lost near 'wall-{k}'. Refine the cells.")
+        for k in (1, 2)
+    }
+    spec, _ = made(ends=ends)
+    capsys.readouterr()
+    progress = _Progress(spec, len(spec.runs))
+    for id in list(spec.runs)[:2]:
+        progress(figures(spec, id))
+    first, second = capsys.readouterr().out.splitlines()
+    assert "Refine the cells." in first
+    assert second.endswith(": energy off")
+    assert "strength" in first
+    assert "MPa" in first
 
 
 def test_reasons_to_doubt_runs_are_told_at_the_end_and_on_the_page(made, capsys):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from coupler.case.keys import find
-from coupler.program.quantities import quantity
+from coupler.program.quantities import as_said
 
 GIVEN, ABSENT = "given", "absent"
 LONGEST = 40
@@ -72,7 +72,7 @@ def _words(value: Any, unit: str) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float) and unit:
-        return quantity(float(value), unit)
+        return as_said(float(value), unit)
     if isinstance(value, list) and unit and all(isinstance(x, int | float) for x in value):
         return f"[{', '.join(f'{x:g}' for x in value)}] {unit}"
     text = f"{value:g}" if isinstance(value, float) else str(value)

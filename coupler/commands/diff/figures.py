@@ -11,7 +11,7 @@ import numpy as np
 
 from array_types import Array
 from coupler.program.process import was_killed
-from coupler.program.quantities import length, moment_of, percent, quantity
+from coupler.program.quantities import as_said, percent
 from coupler.results.history import BadTable, History, by_block, read_history
 
 Value = float | str | None
@@ -84,9 +84,7 @@ class Row:
             return value
         if self.unit == SHARE:
             return percent(value)
-        if self.unit == LENGTH:
-            return length(value) if value is None or value >= 0.0 else quantity(value, LENGTH)
-        return moment_of(value) if self.unit == TIME else quantity(value, self.unit)
+        return as_said(value, self.unit)
 
     def _beside(self, value: Value) -> str:
         off = self.relative(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import re
 import shutil
 import time
 from collections.abc import Iterator
@@ -17,10 +18,11 @@ from coupler.commands.sweep.forecast import forecast
 from coupler.commands.sweep.local import Local, free_cores
 from coupler.commands.sweep.one import FINAL
 from coupler.commands.sweep.plan import Plan, make_plan
-from coupler.commands.sweep.results import Results, collect, write_tables
+from coupler.commands.sweep.results import NUMBERS, Results, collect, write_tables
 from coupler.program import terminal
 from coupler.program.errors import BadCase, ExitCode, SurgebreakError
 from coupler.program.extras import missing
+from coupler.program.quantities import as_said
 from coupler.run.fingerprint import differences, program
 
 ENGINES = (
@@ -183,9 +185,11 @@ class _Progress:
     def __init__(self, spec: Spec, total: int):
         self.sweep, self.free, self.lacking = spec.sweep, {row.free for row in spec.rows}, set()
         self.total, self.count, self.began = total, 0, time.monotonic()
+        self.told: set[str] = set()
         self.label = {}
+        units = {column.name: column.unit for column in spec.columns}
         for row in spec.rows:
-            values = ", ".join(f"{k} {_brief(v)}" for k, v in row.values.items())
+            values = ", ".join(f"{k} {_with_unit(v, units.get(k, ''))}" for k, v in row.values.items())
             self.label.setdefault(row.id, f"row {row.number}: {values}" if values else f"row {row.number}")
             if row.free:
                 self.label.setdefault(row.free, f"free field of row {row.number}")
@@ -194,7 +198,7 @@ class _Progress:
         self.count += 1
         per_run = (time.monotonic() - self.began) / self.count
         left = per_run * (self.total - self.count)
-        reason = f": {found['reason']}" if found["reason"] else ""
+        reason = f": {self._reason(found)}" if found["reason"] else ""
         rest = f"  (about {terminal.duration(left)} left)" if self.count < self.total else ""
         print(
             f"{self.count}/{self.total}  {self.label.get(found['id'], found['id'])}: {found['outcome']}, "
@@ -202,6 +206,16 @@ class _Progress:
             flush=True,
         )
         self._lacks(found)
+
+    def _reason(self, found: dict) -> str:
+        """Why a run did not reach its end; the first clause where another run has told the same but for numbers and
+        names."""
+        whole = str(found["reason"])
+        kind = NUMBERS.sub("#", whole)
+        if kind not in self.told:
+            self.told.add(kind)
+            return whole
+        return re.split(r"[:;.] ", whole, maxsplit=1)[0]
 
     def _lacks(self, found: dict) -> None:
         """What the first run shows to have a wrong name would else be known when all runs are made."""
@@ -216,6 +230,10 @@ class _Progress:
                     f"note: it has no number of {q.name}: {read['why'].removeprefix(f'{q.name}: ')}",
                     flush=True,
                 )
+
+
+def _with_unit(value, unit: str) -> str:
+    return as_said(value, unit) if isinstance(value, float) and unit else _brief(value)
 
 
 def _brief(value) -> str:

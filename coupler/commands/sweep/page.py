@@ -14,7 +14,6 @@ from coupler.commands.report.html import (
     link,
     note,
     paragraph,
-    quantity,
     section,
     table,
 )
@@ -25,6 +24,7 @@ from coupler.commands.sweep.quantities import asked
 from coupler.commands.sweep.results import NOT_YET, Results
 from coupler.commands.sweep.sensitivity import CONFIDENCE, sensitivities
 from coupler.program.errors import NoRun
+from coupler.program.quantities import as_said
 from coupler.program.terminal import duration
 from coupler.run.directory import write_json
 from coupler.run.summary import read_summary
@@ -113,7 +113,7 @@ def _what(spec: Spec, results: Results) -> str:
             "processor time",
             f"{duration(cpu)}, {cpu / max(len(ended_runs), 1):.3g} s a run; {duration(wall)} of wall time in all",
         ),
-        ("largest memory", quantity(max((t["memory"] for t in ended_runs), default=None), "B")),
+        ("largest memory", as_said(max((t["memory"] for t in ended_runs), default=None), "B")),
         ("surgebreak", ", ".join(versions)),
     ]
     return facts(rows)
@@ -194,8 +194,8 @@ def _medians(f: dict) -> str:
 
 def _with_band(value: float, band: list[float | None] | None, unit: str) -> str:
     """A number with its band, an end of which is None where it is infinite."""
-    ended_runs = quantity(value, unit)
-    low, high = (quantity(end, unit) if end is not None else "∞" for end in band or (None, None))
+    ended_runs = as_said(value, unit)
+    low, high = (as_said(end, unit) if end is not None else "∞" for end in band or (None, None))
     return f"{ended_runs} ({low} to {high})" if band else ended_runs
 
 
@@ -252,9 +252,9 @@ def _rows(spec: Spec, results: Results) -> Iterator[str]:
         [
             _link(spec, r),
             *_values(spec, r),
-            *(quantity(r[c.name], c.unit) for c in quantities),
+            *(as_said(r[c.name], c.unit) for c in quantities),
             r["outcome"],
-            quantity(r["cpu_seconds"], "s"),
+            as_said(r["cpu_seconds"], "s"),
         ]
         for r in results.records[:MOST_ROWS]
     ]
@@ -273,7 +273,7 @@ def _heads(spec: Spec) -> list[str]:
 
 def _values(spec: Spec, record: dict) -> list[str]:
     return [
-        quantity(record[c.name], c.unit) if isinstance(record[c.name], int | float) else str(record[c.name])
+        as_said(record[c.name], c.unit) if isinstance(record[c.name], int | float) else str(record[c.name])
         for c in spec.columns
     ]
 

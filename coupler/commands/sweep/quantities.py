@@ -30,11 +30,13 @@ class NoReading(SurgebreakError):
 
 @dataclass(frozen=True)
 class Reading:
-    """value: NaN where there is none, then why says why · of: tells one definition of the quantity from another"""
+    """value: NaN where there is none, then why says why · of: tells one definition of the quantity from another ·
+    unit: that of the column or figure it was taken from, "" where that has none"""
 
     value: float
     why: str
     of: str
+    unit: str = ""
 
 
 def asked(sweep: Sweep) -> tuple[SweepQuantity, ...]:
@@ -58,12 +60,27 @@ def definition(q: SweepQuantity) -> str:
 
 def read_quantity(run: Path, q: SweepQuantity) -> Reading:
     """The number that a run has for a quantity that is not derived."""
+    unit = ""
     try:
-        value = _value(run, q)
+        value, unit = _value(run, q), _unit(run, q)
         why = "" if np.isfinite(value) else f"take = '{q.take}' finds no number"
     except (BadCase, NoReading, NoRun, NotRecorded, BadTable, BadFormula) as error:
         value, why = np.nan, str(error)
-    return Reading(float(value), why, definition(q))
+    return Reading(float(value), why, definition(q), unit)
+
+
+def _unit(run: Path, q: SweepQuantity) -> str:
+    """The unit of what `take` makes of a column of a history, or of a plain figure; "" of anything else."""
+    if q.figure is not None:
+        return PLAIN.get(q.figure, ("", ""))[1]
+    if q.take in ("period", "arrival"):
+        return "s"
+    if q.table is None or q.column is None or q.formula is not None:
+        return ""
+    unit = next(c.unit for c in read_history(run / q.table).columns if c.name == q.column)
+    if q.take != "integral":
+        return unit
+    return unit.removesuffix("/s") if unit.endswith("/s") else f"{unit} s".removeprefix("1 ")
 
 
 def _value(run: Path, q: SweepQuantity) -> float:

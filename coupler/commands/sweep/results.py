@@ -59,7 +59,7 @@ def collect(spec: Spec) -> Results:
         f"{name} has no number in {len(why)} of {done} rows that are done: {why[0]}"
         for name, why in lacks.items()
     )
-    return Results(tuple(_columns(spec)), records, found, lacking, tuple(_doubted(records, found)))
+    return Results(tuple(_columns(spec, found)), records, found, lacking, tuple(_doubted(records, found)))
 
 
 def _doubted(records: tuple[dict, ...], found: dict[str, dict]) -> Iterator[str]:
@@ -78,7 +78,7 @@ def _ids(spec: Spec) -> list[str]:
     return list(dict.fromkeys(id for row in spec.rows for id in (row.id, row.free) if id))
 
 
-def _columns(spec: Spec) -> Iterator[Column]:
+def _columns(spec: Spec, found: dict[str, dict]) -> Iterator[Column]:
     yield Column("run", "1", "number of the row")
     yield Column("point", "1", "point of the grid")
     yield Column("sample", "1", "sample at that point")
@@ -89,7 +89,9 @@ def _columns(spec: Spec) -> Iterator[Column]:
         yield Column(seed_column(key), "1", f"seed: sets {key}")
     for q in asked(spec.sweep):
         free = FREE if q.source == "free field" else ""
-        yield Column(q.name, q.unit or "1", f"{q.what or q.name.replace('_', ' ')}{free}")
+        yield Column(
+            q.name, q.unit or _found_unit(q.name, found) or "1", f"{q.what or q.name.replace('_', ' ')}{free}"
+        )
     yield Column(
         "outcome",
         "",
@@ -101,6 +103,12 @@ def _columns(spec: Spec) -> Iterator[Column]:
     yield Column("memory", "B", "largest resident memory")
     yield Column("attempts", "1", "processes that it took")
     yield Column("id", "", "of the run, its directory in runs/")
+
+
+def _found_unit(name: str, found: dict[str, dict]) -> str:
+    """The unit that the runs have for a quantity; "" where none has one, as in results of an earlier version."""
+    units = (ended_run["readings"].get(name, {}).get("unit", "") for ended_run in found.values())
+    return next(filter(None, units), "")
 
 
 def _sets(keys: tuple[str, ...]) -> str:

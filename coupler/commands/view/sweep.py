@@ -209,7 +209,23 @@ def results(folder):
     for row, name in enumerate(names):
         axes[row, 0].set_ylabel(_axis(meaning[name], units[name], _power(table[name], units[name]), 20))
     drawing.align_ylabels()
+    _explain_marks(drawing, table, names, failed)
     return _save(drawing, folder, "results")
+
+
+def _explain_marks(drawing, table, names, failed):
+    """A legend of the marks beside the points of runs that are done, where there are any."""
+    without = np.any([~np.isfinite(table[name]) for name in names], axis=0) & (table["outcome"] != "not yet")
+    without &= ~failed
+    why = "cannot stand" if (table["outcome"][without] == "cannot stand").all() else "no number"
+    kinds = ((without, "^", LINES[2], why), (failed, "x", LINES[1], "failed"))
+    marks = [
+        plt.Line2D([], [], marker=mark, ls="", ms=4, mew=0.6, color=colour, label=label)
+        for own, mark, colour, label in kinds
+        if own.any()
+    ]
+    if marks:
+        drawing.legend(handles=marks, loc="outside upper right", ncols=2)
 
 
 def _finite(table, name):
