@@ -1,4 +1,4 @@
-"""White water where water is torn, the way to the north, and a camera among the blocks."""
+"""White water where water is torn, the way to the north, a camera among the blocks, and pictures of cases."""
 
 import json
 import subprocess
@@ -6,10 +6,12 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from coupler.commands.view.foam import FAST, TORN, differences, foam
+from coupler.program.process import run_module
 from coupler.program.provenance import ROOT
-from tests.coupler.synthetic_run import tank_mesh
+from tests.coupler.synthetic_run import BOX_FACES, box_vertices, tank_mesh
 
 NODES, CELLS = tank_mesh((4.0, 4.0, 4.0), 1.0)
 LEVEL = NODES[:, 2] - 2.3
@@ -99,3 +101,22 @@ def test_lines_of_a_caption_are_about_as_long_as_one_another(tmp_path):
     assert " ".join(lines) == title
     assert len(lines) == 2
     assert abs(len(lines[0]) - len(lines[1])) < 10
+
+
+def test_the_picture_of_a_case_has_a_legend_that_can_be_read(tmp_path):
+    """Names had the pale colours of what they name, in letters of a fourth of the picture, and half of it was empty."""
+    faces = box_vertices((4.0, 1.0, 1.0))[np.array(BOX_FACES)]
+    triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    part, nothing = np.zeros(len(triangles), int), np.zeros((0, 2, 3))
+    place, picture = tmp_path / "blocks.npz", tmp_path / "case.png"
+    np.savez(
+        place, triangles=triangles, part=part, names=["crate"], edges=nothing, lines=nothing, size=[4, 1, 1]
+    )
+    done = run_module("coupler.commands.view.drawing", place, picture, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    image = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    inked = (image.sum(axis=2) < 150).nonzero()
+    assert len(inked[0]) > 200, "letters in the colour of ink"
+    drawn = (image < 250).any(axis=2)
+    assert drawn.any(axis=1).mean() > 0.6
+    assert drawn.any(axis=0).mean() > 0.6

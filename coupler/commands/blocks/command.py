@@ -172,11 +172,13 @@ def _draw_blocks(cut: Cut, picture: Path) -> None:
         groups,
         np.concatenate(edges),
         np.zeros((0, 2, 3)),
+        np.ptp(np.concatenate([block.world_vertices() for block in cut.blocks]), axis=0),
     )
 
 
 def draw_case(case: Case, picture: Path) -> None:
-    """Blocks by their groups, fixed solids, the ground of a terrain and the boxes of water of a case, at the start."""
+    """Blocks by their groups, fixed solids, the ground of a terrain, the edges of a tank that is a box and the boxes of
+    water of a case, at the start."""
     bodies = [(b.group, b.world_vertices(), b.faces) for part in parts_of(case) for b in part.blocks]
     bodies += [("solid", solid.vertices, solid.faces) for solid in solids_of(case)]
     bed = _bed_triangles(case)
@@ -197,8 +199,17 @@ def draw_case(case: Case, picture: Path) -> None:
         if faces is not None:
             pairs = {tuple(sorted(edge)) for face in faces for edge in zip(face, (*face[1:], face[0]))}
             edges.append(x[np.array(sorted(pairs))])
+    if case.tank is not None and case.tank.is_box:
+        edges.append(_box_edges(case.tank.lower, case.tank.upper))
     lines = np.concatenate(edges) if edges else np.zeros((0, 2, 3))
     _draw(picture, np.concatenate(triangles), np.concatenate(part), names, lines, np.zeros((0, 2, 3)))
+
+
+def _box_edges(lower, upper) -> np.ndarray:
+    """(12, 2, 3) [m] the edges of a box."""
+    corners = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    pairs = [(a, b) for a in range(8) for b in range(a) if np.abs(corners[a] - corners[b]).sum() == 1]
+    return (np.asarray(lower) + corners * np.subtract(upper, lower))[np.array(pairs)]
 
 
 def _bed_triangles(case: Case) -> np.ndarray:
@@ -245,10 +256,13 @@ def _draw_trouble(error: BadDrawing, picture: Path) -> None:
     _draw(picture, error.surface, part, ["drawing"], np.zeros((0, 2, 3)), error.lines)
 
 
-def _draw(picture: Path, triangles, part, names, edges, lines) -> None:
+def _draw(picture: Path, triangles, part, names, edges, lines, size=None) -> None:
+    """size (3,) [m] that the picture tells; None: of what it shows."""
+    if size is None:
+        size = np.ptp(np.concatenate([triangles.reshape(-1, 3), edges.reshape(-1, 3)]), axis=0)
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder) / "blocks.npz"
-        np.savez(there, triangles=triangles, part=part, names=names, edges=edges, lines=lines)
+        np.savez(there, triangles=triangles, part=part, names=names, edges=edges, lines=lines, size=size)
         done = run_module("coupler.commands.view.drawing", there, picture, capture_output=True, text=True)
     if done.returncode != 0:
         raise BadDrawing(f"no picture: {trouble(done.returncode, done.stderr)}")
