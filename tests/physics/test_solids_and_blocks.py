@@ -93,7 +93,7 @@ def test_joints_glue_a_wall_to_a_solid_foot():
         assert s.names[-1] == "root"
         assert len(s.joints) == 2
         held = s.reaction()[-1, 2]
-    assert held == pytest.approx(2000 * 3 * G, rel=1e-6), "the beam and its own weight"
+    assert held == pytest.approx((2 * 2000 + 2400) * G, rel=1e-6), "the beam, and its own weight of concrete"
 
 
 def test_the_water_loads_a_solid_alike_with_and_without_blocks():
