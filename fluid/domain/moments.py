@@ -207,7 +207,7 @@ def _touching_among(first, last, cell_list, marked, cells):
     found = np.empty(last - first, np.int64)
     n = 0
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         if marked[cells[e, 0]] or marked[cells[e, 1]] or marked[cells[e, 2]] or marked[cells[e, 3]]:
             found[n] = e
             n += 1

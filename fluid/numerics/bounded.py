@@ -211,7 +211,8 @@ def _far_below(first, last, x, lower, held, slack, found):
 def _some_below(first, last, x, lower, held):
     """How many x lie below their bound and are not held."""
     count = 0
-    for i in range(first, last):
+    for k in range(first, last):
+        i = np.uint64(k)
         count += x[i] < lower[i] and not held[i]
     return count
 

@@ -160,23 +160,24 @@ def _split(indptr, indices, data):
 @ranged
 def _parted(first, last, indptr, indices, data, end, middle, column, entry, diagonal):
     """Rows of `_split`, each of which has one entry on the diagonal; → whether that is so."""
-    for i in range(first, last):
-        k, below, right = indptr[i] - i, np.int64(0), np.int64(0)
-        for s in range(indptr[i], indptr[i + 1]):
+    for row in range(first, last):
+        i, one = np.uint64(row), np.uint64(1)
+        begin, below, right = np.int64(indptr[i]) - row, np.int64(0), np.int64(0)
+        for s in range(indptr[i], indptr[i + one]):
             below += indices[s] < i
             right += indices[s] > i
-        after = k + below
-        wrong = below + right + 1 != np.int64(indptr[i + 1]) - np.int64(indptr[i])
-        if wrong or k < 0 or after + right > column.shape[0]:
+        wrong = below + right + 1 != np.int64(indptr[i + one]) - np.int64(indptr[i])
+        if wrong or begin < 0 or begin + below + right > column.shape[0]:
             return False
-        middle[i], end[i] = after, after + right
-        for s in range(indptr[i], indptr[i + 1]):
+        middle[i], end[i] = begin + below, begin + below + right
+        k, after = np.uint64(begin), np.uint64(begin + below)
+        for s in range(indptr[i], indptr[i + one]):
             if indices[s] < i:
                 column[k], entry[k] = indices[s], data[s]
-                k += 1
+                k += one
             elif indices[s] > i:
                 column[after], entry[after] = indices[s], data[s]
-                after += 1
+                after += one
             else:
                 diagonal[i] = data[s]
     return True
@@ -297,27 +298,32 @@ def _coarse_rows(begin_row, end_row, first, member, fine, aggregate, n, scale):
     slot, indptr = np.full(n, -1, np.int64), np.zeros(end_row - begin_row + 1, np.uint32)
     indices, data = np.empty(room, np.uint32), np.empty(room)
     k = 0
-    for row in range(begin_row, end_row):
-        begin = k
-        slot[row], indices[k], data[k] = k, row, 0.0
+    for at in range(begin_row, end_row):
+        row, begin, own = np.uint64(at), k, 0.0
+        slot[row], indices[np.uint64(k)] = k, at
         k += 1
-        for t in range(first[row], first[row + 1]):
-            i = member[t]
-            data[begin] += scale * diagonal[i]
-            for s in range(start[i], start[i + 1]):
-                c = aggregate[column[s]]
-                if slot[c] < begin:
-                    slot[c], indices[k], data[k] = k, c, 0.0
+        for t in range(first[row], first[row + np.uint64(1)]):
+            i = np.uint64(member[t])
+            own += scale * diagonal[i]
+            for s in range(start[i], start[i + np.uint64(1)]):
+                c = np.uint64(aggregate[column[s]])
+                if c == row:
+                    own += scale * entry[s]
+                elif slot[c] < begin:
+                    slot[c], indices[np.uint64(k)], data[np.uint64(k)] = k, c, 0.0 + scale * entry[s]
                     k += 1
-                data[slot[c]] += scale * entry[s]
-        indptr[row - begin_row + 1] = k
+                else:
+                    data[np.uint64(slot[c])] += scale * entry[s]
+        data[np.uint64(begin)] = own
+        indptr[np.uint64(at - begin_row + 1)] = k
     return indptr, indices[:k].copy(), data[:k].copy()
 
 
 @plain
 def _from_zero(start, middle, column, entry, inverse, r, x):
     """Forward sweep from zero → x."""
-    for i in range(len(r)):
+    for k in range(len(r)):
+        i = np.uint64(k)
         total = r[i]
         for s in range(start[i], middle[i]):
             total -= entry[s] * x[column[s]]
@@ -328,9 +334,10 @@ def _from_zero(start, middle, column, entry, inverse, r, x):
 def _right_over(first, last, at, x, left):
     """r - A x after `_from_zero`: what lies right of the diagonal."""
     start, middle, column, entry = at.start, at.middle, at.column, at.entry
-    for i in range(first, last):
+    for k in range(first, last):
+        i = np.uint64(k)
         total = 0.0
-        for s in range(middle[i], start[i + 1]):
+        for s in range(middle[i], start[i + np.uint64(1)]):
             total -= entry[s] * x[column[s]]
         left[i] = total
 
@@ -367,21 +374,23 @@ def _down(start, column, entry, inverse, aggregate, middle, n_coarse, r):
     n = len(r)
     x, coarse = np.empty(n), np.zeros(n_coarse)
     _from_zero(start, middle, column, entry, inverse, r, x)
-    for i in range(n):
+    for k in range(n):
+        i = np.uint64(k)
         left = 0.0
-        for s in range(middle[i], start[i + 1]):
+        for s in range(middle[i], start[i + np.uint64(1)]):
             left -= entry[s] * x[column[s]]
         if aggregate[i] >= 0:
-            coarse[aggregate[i]] += left
+            coarse[np.uint64(aggregate[i])] += left
     return x, coarse
 
 
 @plain
 def _up(start, column, entry, inverse, aggregate, coarse, r, x):
     """x + P coarse, then the backward sweep, in place."""
-    for i in range(len(x)):
+    for k in range(len(x)):
+        i = np.uint64(k)
         if aggregate[i] >= 0:
-            x[i] += coarse[aggregate[i]]
+            x[i] += coarse[np.uint64(aggregate[i])]
     _backward(start, column, entry, inverse, r, x)
 
 
@@ -391,7 +400,8 @@ def _down_blocks(first, last, bounds, at, r, x):
     start, middle, column, entry, inverse = at.start, at.middle, at.column, at.entry, at.inverse
     for b in range(first, last):
         low = bounds[b]
-        for i in range(low, bounds[b + 1]):
+        for k in range(low, bounds[b + 1]):
+            i = np.uint64(k)
             total = r[i]
             for s in range(start[i], middle[i]):
                 if column[s] >= low:
@@ -405,12 +415,13 @@ def _left_over(first, last, bounds, at, x, left):
     start, middle, column, entry = at.start, at.middle, at.column, at.entry
     for b in range(first, last):
         low = bounds[b]
-        for i in range(low, bounds[b + 1]):
+        for k in range(low, bounds[b + 1]):
+            i = np.uint64(k)
             total = 0.0
             for s in range(start[i], middle[i]):
                 if column[s] < low:
                     total -= entry[s] * x[column[s]]
-            for s in range(middle[i], start[i + 1]):
+            for s in range(middle[i], start[i + np.uint64(1)]):
                 total -= entry[s] * x[column[s]]
             left[i] = total
 
@@ -418,9 +429,10 @@ def _left_over(first, last, bounds, at, x, left):
 @ranged
 def _restricted(begin, end, first, member, left, coarse):
     """Pᵀ left."""
-    for k in range(begin, end):
+    for j in range(begin, end):
+        k = np.uint64(j)
         total = 0.0
-        for t in range(first[k], first[k + 1]):
+        for t in range(first[k], first[k + np.uint64(1)]):
             total += left[member[t]]
         coarse[k] = total
 
@@ -440,11 +452,12 @@ def _up_blocks(first, last, bounds, at, r, before, x):
     start, middle, column, entry, inverse = at.start, at.middle, at.column, at.entry, at.inverse
     for b in range(first, last):
         low, high = bounds[b], bounds[b + 1]
-        for i in range(high - 1, low - 1, -1):
+        for k in range(high - 1, low - 1, -1):
+            i = np.uint64(k)
             total = r[i]
             for s in range(start[i], middle[i]):
                 total -= entry[s] * before[column[s]]
-            for s in range(middle[i], start[i + 1]):
+            for s in range(middle[i], start[i + np.uint64(1)]):
                 j = column[s]
                 total -= entry[s] * (x[j] if j < high else before[j])
             x[i] = total * inverse[i]
@@ -461,8 +474,9 @@ def _forward(start, column, entry, inverse, r, x):
 
 @plain
 def _backward(start, column, entry, inverse, r, x):
-    for i in range(len(r) - 1, -1, -1):
+    for k in range(len(r) - 1, -1, -1):
+        i = np.uint64(k)
         total = r[i]
-        for s in range(start[i], start[i + 1]):
+        for s in range(start[i], start[i + np.uint64(1)]):
             total -= entry[s] * x[column[s]]
         x[i] = total * inverse[i]

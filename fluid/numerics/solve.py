@@ -131,14 +131,16 @@ def _length(v) -> float:
 @ranged
 def _turn(first, last, z, share, p):
     """z + share p (n,) in the place of p."""
-    for i in range(first, last):
+    for k in range(first, last):
+        i = np.uint64(k)
         p[i] = z[i] + share * p[i]
 
 
 @ranged
 def _advance(first, last, share, p, Ap, x, r):
     """x + share p and r - share Ap in place."""
-    for i in range(first, last):
+    for k in range(first, last):
+        i = np.uint64(k)
         x[i] += share * p[i]
         r[i] -= share * Ap[i]
 
@@ -157,9 +159,10 @@ def _product(indptr, indices, data, v):
 
 @ranged
 def _rows(first, last, indptr, indices, data, v, out):
-    for i in range(first, last):
+    for k in range(first, last):
+        i = np.uint64(k)
         total = 0.0
-        for s in range(indptr[i], indptr[i + 1]):
+        for s in range(indptr[i], indptr[i + np.uint64(1)]):
             total += data[s] * v[indices[s]]
         out[i] = total
 

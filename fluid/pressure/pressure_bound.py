@@ -139,10 +139,10 @@ def _bounds(first, last, dofs, graph_row, start, neighbour, phi, open_to_air, ve
     """The first of two bounds (n,) [Pa], and the second at or next to dry nodes, open sides or water that has
     separated."""
     for r in range(first, last):
-        i = dofs[r]
+        i = np.uint64(dofs[r])
         vented = open_to_air[i] or ventilated[i]
-        row = graph_row[i]
-        for s in range(start[row], start[row + 1]):
+        row = np.uint64(graph_row[i])
+        for s in range(start[row], start[row + np.uint64(1)]):
             j = neighbour[s]
             vented = vented or phi[j] >= 0.0 or open_to_air[j] or ventilated[j]
         bound[r] = either[1] if vented else either[0]

@@ -148,9 +148,9 @@ class WetCells(NamedTuple):
 def _row_lengths(first, last, dofs, column, edges, length):
     graph_row, start, neighbour, stiffness = edges
     for r in range(first, last):
-        row = graph_row[dofs[r]]
+        row = np.uint64(graph_row[np.uint64(dofs[r])])
         count = 1
-        for s in range(start[row], start[row + 1]):
+        for s in range(start[row], start[row + np.uint64(1)]):
             count += stiffness[s] != 0.0 and column[neighbour[s]] >= 0
         length[r] = count
 
@@ -160,19 +160,20 @@ def _wet_rows(first, last, dofs, column, edges, surface, scale, reserve, made):
     graph_row, start, neighbour, stiffness = edges
     phi, open_node = surface
     indptr, indices, entries, anchored, turned = made
-    for r in range(first, last):
-        i = dofs[r]
-        row = graph_row[i]
-        at = indptr[r]
+    for place in range(first, last):
+        r = np.uint64(place)
+        i = np.uint64(dofs[r])
+        row = np.uint64(graph_row[i])
+        at = np.uint64(indptr[r])
         diagonal, beyond = 0.0, 0.0
-        for s in range(start[row], start[row + 1]):
+        for s in range(start[row], start[row + np.uint64(1)]):
             j = neighbour[s]
             if stiffness[s] == 0.0:  # along half of the edges of a split brick
                 continue
             k = -scale * stiffness[s]
             if column[j] >= 0:
                 diagonal += k
-                at += 1
+                at += np.uint64(1)
                 indices[at] = column[j]
                 entries[at] = -k
             elif open_node[j]:
@@ -289,10 +290,16 @@ def _cell_velocity(first, last, cell_list, u, remainder, fluid, out):
     for s in range(first, last):
         e = np.uint64(cell_list[s])
         row = share_row[e]
-        for k in range(3):
-            out[s, k] = remainder[s, k] if remainder.shape[0] > 0 else 0.0
-            for a in range(4):
-                out[s, k] += share[row, a] * u[cells[e, a], k]
+        t = np.uint64(s)
+        x, y, z = 0.0, 0.0, 0.0
+        if remainder.shape[0] > 0:
+            x, y, z = remainder[t, 0], remainder[t, 1], remainder[t, 2]
+        for a in range(4):
+            i = cells[e, a]
+            x += share[row, a] * u[i, 0]
+            y += share[row, a] * u[i, 1]
+            z += share[row, a] * u[i, 2]
+        out[t, 0], out[t, 1], out[t, 2] = x, y, z
 
 
 def inflow(cell_list, u_cell, fluid, n_nodes):
@@ -313,12 +320,12 @@ def _inflow(first, last, runs, cell_list, u_cell, fluid, out):
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])
-            p = parent[e]
+            p, t, size = parent[e], np.uint64(s), volume[e]
+            x, y, z = u_cell[t, 0], u_cell[t, 1], u_cell[t, 2]
             for a in range(4):
-                if first <= cells[e, a] < last:
-                    out[cells[e, a]] += volume[e] * (
-                        u_cell[s, 0] * g[p, a, 0] + u_cell[s, 1] * g[p, a, 1] + u_cell[s, 2] * g[p, a, 2]
-                    )
+                i = cells[e, a]
+                if first <= i < last:
+                    out[i] += size * (x * g[p, a, 0] + y * g[p, a, 1] + z * g[p, a, 2])
 
 
 def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells, volume):
@@ -407,7 +414,7 @@ def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
                     wa = w * max(share[row, a], 1e-9)
                     weight[i] += wa
                     for k in range(3):
-                        out[i, k] += wa * value[s, k]
+                        out[i, k] += wa * value[np.uint64(s), k]
     for j in range(first, last):
         i = np.uint64(j)
         if weight[i] > 0.0:

@@ -178,13 +178,15 @@ def _projected(t, kept, gradient, dt):
 def _after_pressure(first, last, wet, u_star, mean, advected, time, made):
     """made: u and a of wet nodes, u* of the others; u* - Π∇x of all."""
     u, a, forced = made
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         for k in range(3):
-            forced[i, k] = u_star[i, k] - mean[i, k]
+            pushed = u_star[i, k] - mean[i, k]
+            forced[i, k] = pushed
             u[i, k] = u_star[i, k]
             if wet[i]:
-                u[i, k] = forced[i, k]
-                a[i, k] = (forced[i, k] - advected[i, k]) / time
+                u[i, k] = pushed
+                a[i, k] = (pushed - advected[i, k]) / time
 
 
 def _limit_and_damp(water, kept, u, a, held, projected, calm):
@@ -242,7 +244,8 @@ def _limit_speed(water, u, a) -> int:
 @ranged
 def _clip(first, last, u, a, limit, weight):
     count = 0
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         speed = np.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         if speed > limit:
             count += 1
@@ -348,17 +351,21 @@ def _cells_of_flux(first, last, cell_list, u, wet, known, fluid, now, before):
         while b < b_end and cells_before[b] < cell_list[s]:
             b += np.uint64(1)
         is_wet = w < w_end and wet_cells[w] == cell_list[s]
-        for k in range(3):
-            if is_wet:
-                now[s, k] = star[w, k] - taken[w, k]
-            else:
-                now[s, k] = 0.0
-                for a in range(4):
-                    now[s, k] += share[row, a] * u[cells[e, a], k]
+        t = np.uint64(s)
+        x, y, z = 0.0, 0.0, 0.0
+        if is_wet:
+            x, y, z = star[w, 0] - taken[w, 0], star[w, 1] - taken[w, 1], star[w, 2] - taken[w, 2]
+        else:
+            for a in range(4):
+                i = cells[e, a]
+                x += share[row, a] * u[i, 0]
+                y += share[row, a] * u[i, 1]
+                z += share[row, a] * u[i, 2]
+        now[t, 0], now[t, 1], now[t, 2] = x, y, z
         moved = b < b_end and cells_before[b] == cell_list[s]
         moved = moved and (u_before[b, 0] != 0.0 or u_before[b, 1] != 0.0 or u_before[b, 2] != 0.0)
         for k in range(3):
-            before[s, k] = u_before[b, k] if moved else now[s, k]
+            before[t, k] = u_before[b, k] if moved else now[t, k]
 
 
 def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):

@@ -34,7 +34,8 @@ def kicked(velocity, acceleration, kick, dt: float, whole: float, middle: float)
 
 @ranged
 def _kicked(first, last, velocity, acceleration, kick, dt, whole, middle, u_hat, u_m):
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         factor = dt * kick[i]
         for k in range(3):
             a = factor * acceleration[i, k]

@@ -209,7 +209,8 @@ def _sheared(water, dt, theta, kick, surface, u_adv):
 @ranged
 def _fallen(first, last, u, gained, active, out):
     """u + gained (N, 3) at active nodes, zero elsewhere."""
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         for k in range(3):
             out[i, k] = u[i, k] + gained[k] if active[i] else 0.0
 

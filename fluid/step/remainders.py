@@ -118,15 +118,16 @@ def _leave(first, last, cell_list, below, near, slopes, before, time, fluid, mad
         if highest >= deep:
             wet_and_cut_short = highest < 0.0 and most > 0.0
             lives_on = most * _fast(u, gravity * size[cells[e, 0]], cells, e) if wet_and_cut_short else 0.0
+        t, row = np.uint64(s), share_row[e]
         for k in range(3):
-            remainder[s, k], rate[s, k] = 0.0, 0.0
+            remainder[t, k], rate[t, k] = 0.0, 0.0
             if lives_on > 0.0:
                 left = 0.0
                 for a in range(4):
-                    left += share[share_row[e], a] * mean[cells[e, a], k]
-                left -= gradient[s, k]
-                remainder[s, k] = lives_on * (before[s, k] + left)
-                rate[s, k] = lives_on * left / time
+                    left += share[row, a] * mean[cells[e, a], k]
+                left -= gradient[t, k]
+                remainder[t, k] = lives_on * (before[t, k] + left)
+                rate[t, k] = lives_on * left / time
 
 
 @inner

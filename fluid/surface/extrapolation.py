@@ -179,17 +179,23 @@ def mean_gradients(cell_list, marked, f, fluid, there):
 @released
 def _mean_gradients(first, last, runs, cell_list, marks, f, fluid, weight, gradient):
     m, (marked, there) = f.shape[1], marks
-    local = np.empty((m, 3))
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         weight[i] = 0.0
         if there[i]:
             for k in range(m):
                 for d in range(3):
                     gradient[i, k, d] = 0.0
     if m == SPACE:
-        _add_gradients(first, last, SPACE, runs, cell_list, marked, f, fluid, local, weight, gradient)
+        _add_slopes(first, last, runs, cell_list, marked, f, fluid, weight, gradient)
     else:
-        _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, local, weight, gradient)
+        _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, np.empty((m, 3)), weight, gradient)
+    for j in range(first, last):
+        i = np.uint64(j)
+        if weight[i] > 0.0:
+            for k in range(m):
+                for d in range(3):
+                    gradient[i, k, d] /= weight[i]
 
 
 @inlined
@@ -222,12 +228,37 @@ def _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, local, wei
                     for k in range(m):
                         for d in range(3):
                             gradient[i, k, d] += local[k, d]
-    for j in range(first, last):
-        i = np.uint64(j)
-        if weight[i] > 0.0:
-            for k in range(m):
-                for d in range(3):
-                    gradient[i, k, d] /= weight[i]
+
+
+@inlined
+def _add_slopes(first, last, runs, cell_list, marked, f, fluid, weight, gradient):
+    """`_add_gradients` of a velocity, whose gradient stays in registers."""
+    cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = np.uint64(cell_list[s])
+            if not (
+                marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]
+            ):
+                continue
+            p, size = parent[e], volume[e]
+            ux, uy, uz, vx, vy, vz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for a in range(4):
+                i = cells[e, a]
+                u, v, w, x, y, z = f[i, 0], f[i, 1], f[i, 2], g[p, a, 0], g[p, a, 1], g[p, a, 2]
+                ux, uy, uz = ux + u * x, uy + u * y, uz + u * z
+                vx, vy, vz = vx + v * x, vy + v * y, vz + v * z
+                wx, wy, wz = wx + w * x, wy + w * y, wz + w * z
+            ux, uy, uz, vx, vy, vz = ux * size, uy * size, uz * size, vx * size, vy * size, vz * size
+            wx, wy, wz = wx * size, wy * size, wz * size
+            for a in range(4):
+                i = cells[e, a]
+                if first <= i < last:
+                    weight[i] += size
+                    at = gradient[i]
+                    at[0, 0], at[0, 1], at[0, 2] = at[0, 0] + ux, at[0, 1] + uy, at[0, 2] + uz
+                    at[1, 0], at[1, 1], at[1, 2] = at[1, 0] + vx, at[1, 1] + vy, at[1, 2] + vz
+                    at[2, 0], at[2, 1], at[2, 2] = at[2, 0] + wx, at[2, 1] + wy, at[2, 2] + wz
 
 
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
@@ -294,7 +325,7 @@ def _with_field(cell_list, marked, cells):
 @ranged
 def _mark_field(first, last, cell_list, marked, cells, has, beside):
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         inside = marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]
         for a in range(4):
             if inside:
@@ -312,23 +343,28 @@ def _averaged(nodes, has, field, topology):
     return mean
 
 
-@released
+@ranged
 def _average(first, last, nodes, has, node_start, around_by_cells, field, mean):
-    (start, around, shared), total = around_by_cells, np.empty(ENTRIES)
+    start, around, shared = around_by_cells
     for s in range(first, last):
         i = np.uint64(nodes[np.uint64(s)])
         count = float(node_start[i + np.uint64(1)] - node_start[i])
-        for k in range(ENTRIES):
-            total[k] = count * field[i, k]
+        own = field[i]
+        a, b, c = count * own[0], count * own[1], count * own[2]
+        d, e, f = count * own[3], count * own[4], count * own[5]
+        g, h, q = count * own[6], count * own[7], count * own[8]
         for t in range(start[i], start[i + np.uint64(1)]):
             j = around[t]
             if has[j]:
-                weight = float(shared[t])
+                weight, other = float(shared[t]), field[j]
                 count += weight
-                for k in range(ENTRIES):
-                    total[k] += weight * field[j, k]
-        for k in range(ENTRIES):
-            mean[i, k] = total[k] / count
+                a, b, c = a + weight * other[0], b + weight * other[1], c + weight * other[2]
+                d, e, f = d + weight * other[3], e + weight * other[4], f + weight * other[5]
+                g, h, q = g + weight * other[6], h + weight * other[7], q + weight * other[8]
+        out = mean[i]
+        out[0], out[1], out[2] = a / count, b / count, c / count
+        out[3], out[4], out[5] = d / count, e / count, f / count
+        out[6], out[7], out[8] = g / count, h / count, q / count
 
 
 def _own_speed(nodes, factor, forced):

@@ -91,5 +91,6 @@ def _longest_way(first, last, band, way, spacing):
 def lower(first, last, band, phi, shift, most, spacing, out):
     """φ (N,) less the shift (n,) within ± most cells, in `out` (N,) at the nodes of the band (n,)."""
     for s in range(first, last):
-        i, limit = band[s], most * spacing[band[s]]
+        i = np.uint64(band[s])
+        limit = most * spacing[i]
         out[i] = phi[i] - min(max(shift[s], -limit), limit)

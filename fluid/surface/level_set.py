@@ -118,10 +118,10 @@ def _surface_triangles(first, last, cut, phi, nodes, cells):
     triangles = np.empty((2 * (last - first), 3, 3))
     owner = np.empty(2 * (last - first), np.int64)
     crossing = np.empty((4, 3))
-    wet, dry = np.empty(4, np.int64), np.empty(4, np.int64)
+    wet, dry = np.empty(4, np.uint64), np.empty(4, np.uint64)
     n = 0
     for s in range(first, last):
-        e = cut[s]
+        e = np.uint64(cut[s])
         n_wet, n_dry = 0, 0
         for a in range(4):
             if phi[cells[e, a]] < 0.0:

@@ -77,11 +77,12 @@ def rows_of_shift(band, place, edges, c, kappa, spacing) -> ShiftRows:
 def _length_of_rows(begin, end, band, place, edges, found):
     """Edges that conduct within the band (n,), of each of its nodes."""
     graph_row, start, neighbour, stiffness = edges
-    for r in range(begin, end):
-        row = graph_row[band[r]]
-        for s in range(start[row], start[row + 1]):
-            if place[neighbour[s]] >= 0 and stiffness[s] < 0.0:
-                found[r] += 1
+    for k in range(begin, end):
+        r = np.uint64(k)
+        row, count = np.uint64(graph_row[np.uint64(band[r])]), np.uint32(0)
+        for s in range(start[row], start[row + np.uint64(1)]):
+            count += np.uint32(place[neighbour[s]] >= 0 and stiffness[s] < 0.0)
+        found[r] = count
 
 
 @ranged
@@ -90,16 +91,17 @@ def _rows_of_shift(begin, end, band, place, edges, c, kappa, spacing, made):
     graph_row, start, neighbour, stiffness = edges
     first, column, entry, diagonal = made
     least, largest = np.inf, 0.0
-    for r in range(begin, end):
-        row, k, total = graph_row[band[r]], first[r], c[r]
-        for s in range(start[row], start[row + 1]):
+    for j in range(begin, end):
+        r = np.uint64(j)
+        i = np.uint64(band[r])
+        row, k, total, own = np.uint64(graph_row[i]), np.uint64(first[r]), c[r], kappa * spacing[i]
+        for s in range(start[row], start[row + np.uint64(1)]):
             q = place[neighbour[s]]
             if q >= 0 and stiffness[s] < 0.0:
-                column[k] = q
-                both = kappa * spacing[band[r]] + kappa * spacing[neighbour[s]]
-                entry[k] = 0.5 * both * stiffness[s]
-                total -= entry[k]
-                k += 1
+                coupling = 0.5 * (own + kappa * spacing[neighbour[s]]) * stiffness[s]
+                column[k], entry[k] = q, coupling
+                total -= coupling
+                k += np.uint64(1)
         diagonal[r] = total
         least, largest = min(least, total), max(largest, total)
     return least, largest
@@ -154,9 +156,10 @@ def _product(begin, end, first, column, entry, diagonal, p, Ap, partial):
     """A p (n,), and p·A p."""
     for c in range(begin, end):
         dot = 0.0
-        for r in range(c * CHUNK, min((c + 1) * CHUNK, p.shape[0])):
+        for k in range(c * CHUNK, min((c + 1) * CHUNK, p.shape[0])):
+            r = np.uint64(k)
             total = diagonal[r] * p[r]
-            for s in range(first[r], first[r + 1]):
+            for s in range(first[r], first[r + np.uint64(1)]):
                 total += entry[s] * p[column[s]]
             Ap[r] = total
             dot += p[r] * total

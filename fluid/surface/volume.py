@@ -104,8 +104,9 @@ class FluxAhead:
 @ranged
 def _half_ahead(first, last, cells, now, before, share, out):
     """u + ½ share (u - u_before) (M, 3) [m/s] of the listed cells (n,); other cells are not written to."""
-    for s in range(first, last):
-        e = cells[s]
+    for j in range(first, last):
+        s = np.uint64(j)
+        e = np.uint64(cells[s])
         for k in range(3):
             if before[s, k] == now[s, k]:
                 out[e, k] = now[s, k]
@@ -265,7 +266,7 @@ def _equation(first, last, band, slope, capacity, spacing, water, c, residual):
     """c and the right hand side (n,) of (2); water (N,): carried, and of φ itself."""
     carried, own = water
     for s in range(first, last):
-        i = band[s]
+        i = np.uint64(band[s])
         c[s] = slope[i] + ANCHOR * capacity[i] / spacing[i]
         residual[s] = carried[i] - own[i]
 
@@ -324,7 +325,7 @@ def _in_reach(cell_list, phi, cells, most, spacing, seen):
 def _reached(first, last, cell_list, phi, cells, most, spacing, seen):
     found, n = np.empty(last - first, np.int64), 0
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         under, beyond, near = True, True, False
         for a in range(4):
             i = cells[e, a]

@@ -161,7 +161,7 @@ def _mixed(first, last, nodes, volumes, weights, at_surface, on_open_side, carri
     (N,): φ and size of the cells [m], near solids bool."""
     (water, capacity), (around_jumps, fast), (phi, spacing, near_solids) = volumes, weights, at_surface
     for s in range(first, last):
-        i = nodes[s]
+        i = np.uint64(nodes[s])
         depth = (phi[i] / spacing[i] + DEEP) / (DEEP - SHALLOW)
         weight = 0.0 if near_solids[i] else around_jumps[i] * min(max(depth, 0.0), 1.0)
         weight = max(weight, 0.0 if on_open_side[i] else fast[i])

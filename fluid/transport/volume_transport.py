@@ -83,7 +83,7 @@ def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, room
     """max_i Σ out / V_i [1/s] over nodes of some size, whose room (N,) [m³] is more than `least` [m³]."""
     largest = 0.0
     for place in range(first, last):
-        i = nodes[place]
+        i = np.uint64(nodes[place])
         if room[i] > least:
             largest = max(largest, _out(np.uint64(graph_row[i]), start, rate) / max(capacity[i], 1e-300))
     return largest
