@@ -109,7 +109,7 @@ def _lowest_below(face_cell, corners, part, nodes, cells, parent, g, covered, ph
     for s in range(face_cell.shape[0]):
         e = face_cell[s]
         own = part[e]
-        if holds[own]:
+        if own < 0 or holds[own]:  # a face on the border of cells that are whole has no part
             continue
         lowest = np.inf
         for a in range(4):

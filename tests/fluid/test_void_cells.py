@@ -49,3 +49,16 @@ def test_a_part_that_lies_on_no_body_holds_water_where_a_corner_of_it_is_below_t
         expected.append((corners @ phi[domain.cells[cell]]).min() < dry)
     assert 5 < sum(expected) < len(expected) - 5
     np.testing.assert_array_equal(holds[domain.part[bare]], expected)
+
+
+def test_faces_on_the_border_of_whole_cells_wet_no_part():
+    """A box that ends where cells end cuts none of them, but has faces in them. They counted for the last part there
+    is, and without any for memory that lies before the list of parts."""
+    mesh = box_mesh(np.zeros(3), [2.0, 2.0, 2.0], CELL)
+    under_water, in_the_air = ([0.75, 0.75, 0.75], [0.5, 0.5, 0.5]), ([0.75, 0.75, 1.75], [0.3, 0.3, 0.3])
+    domain = cut_domain(mesh, ConvexBodies.boxes(*map(list, zip(under_water, in_the_air))))
+    assert (domain.part[domain.face_cell] < 0).any()
+    water = Water(mesh, domain, lambda x: x[:, 2] - 1.25, WaterParameters())
+    holds = _holding(domain, water.topology, water.level_set, -1e-9 * CELL)
+    assert len(holds) > 10
+    assert not holds.any()
