@@ -33,7 +33,8 @@ def terrain(
     """Show a terrain, and how well cells represent it.
 
     Tables give its extent, heights and slopes, and how much of the ground is lost with cells of several sizes. For a
-    run it lists the maps of the flood; --map draws them in one picture with the state of the buildings.
+    run it lists the maps of the flood; --map draws them in one picture with solids, blocks
+    and the state of the buildings.
     """
     one_thread()
     if map_ is not None:
