@@ -12,7 +12,8 @@ pressure takes cells that the surface cuts whole, and so it takes their faces,
 
 as it does with the polygons of bodies: a stream of one velocity then passes the side as it is.  With (1) the uppermost
 wet nodes let out less than such a stream brings; it was dammed up and slowed down there, and since the velocity of the
-side is given, so that it still left with it, it gained up to 3 % of the energy that left.
+side is given, so that it still left with it, it gained up to 3 % of the energy that left.  No air comes with the water:
+what of (1a) lies above the surface is taken off the balance of the pocket of trapped air there.
 Beyond the surface the pressure goes on with the weight, p = -ρ g φ, on the nodes of an inflow: its work is that of a
 pressure that ends at the surface, and not of one that ends at the dry nodes.
 Sea: φ = z - level on its nodes and there
@@ -175,6 +176,16 @@ class Side:
         counted = ~np.isin(self.element, void)
         return self._rate(u, np.repeat(counted[:, None] / 3.0, 3, axis=1))
 
+    def drive_of_air(self, phi, u, void):
+        """What of `drive` passes above the surface of φ (N,) [m], at the dry nodes of each face: (N,) [m³/s]."""
+        counted = ~np.isin(self.element, void)
+        wet = wet_shares(np.einsum("fca,fa->fc", self.hats, phi[self.faces]))
+        share = np.einsum("fca,fc->fa", self.hats, counted[:, None] * (1.0 / 3.0 - wet))
+        above = -np.einsum("fa,fak,fk->f", share, u[self.faces], self.area)
+        dry, q = phi[self.faces] >= 0.0, np.zeros(len(u))
+        np.add.at(q, self.faces, dry * (above / np.maximum(dry.sum(axis=1), 1))[:, None])
+        return q
+
     def _rate(self, u, wet):
         """q (N,) [m³/s] with ∫ N_a dA over what counts of each triangle, wet (F, 3), over its area."""
         q = np.zeros(len(u))
@@ -269,6 +280,15 @@ class Sides:
         for side in self.now:
             if not side.is_sea:
                 rate += side.drive(u, void)
+        return rate
+
+    def drive_of_air(self, phi, u, void):
+        """What of `drive` passes above the surface of φ (N,) [m], at dry nodes: (N,) [m³/s]. No air comes with it, so
+        that pockets have to do without it."""
+        rate = np.zeros(len(u))
+        for side in self.now:
+            if not side.is_sea:
+                rate += side.drive_of_air(phi, u, void)
         return rate
 
     def flow_rate(self, phi, u):

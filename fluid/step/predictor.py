@@ -373,7 +373,11 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     )
     if water.films is not None:
         problem = water.films.handed_on(water, problem)
-    return problem if cushions is None else cushions.within(problem, rhs, coupling, part.void, water.domain)
+    if cushions is None:
+        return problem
+    if water.sides is not None:
+        rhs = rhs - water.sides.drive_of_air(phi, moved.advected, part.void)
+    return cushions.within(problem, rhs, coupling, part.void, water.domain)
 
 
 @ranged

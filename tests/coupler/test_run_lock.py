@@ -54,7 +54,7 @@ def test_of_two_resumptions_at_once_one_goes_on(stopped):
 
 
 def test_a_refused_resumption_holds_nothing(stopped):
-    with pytest.raises(Exception, match=r"only time.end"):
+    with pytest.raises(Exception, match=r"this belongs to what the run computes"):
         prepare(stopped, ["contact.friction=1"])
     lock = RunLock(stopped)
     assert lock.known

