@@ -83,16 +83,16 @@ def _of_bodies(bodies: Sequence[dict]) -> Iterator[str]:
     if len(joined) < 2:
         return
     parts = []
-    for state in ("collapsed", "damaged", "stands"):
+    for state, of_one, of_several in (
+        ("collapsed", "collapsed", "collapsed"),
+        ("damaged", "is damaged", "are damaged"),
+        ("stands", "stands", "stand"),
+    ):
         names = [body["name"] for body in joined if body["state"] == state]
-        if not names:
-            continue
-        verb = {"collapsed": "collapsed", "damaged": "are damaged", "stands": "stand"}[state]
-        if len(names) == 1:
-            verb = {"collapsed": "collapsed", "damaged": "is damaged", "stands": "stands"}[state]
         more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
         which = f" ({', '.join(names[:MOST_NAMED])}{more})" if state != "stands" else ""
-        parts.append(f"{len(names)} {verb}{which}")
+        if names:
+            parts.append(f"{len(names)} {of_one if len(names) == 1 else of_several}{which}")
     yield f"of {len(joined)} bodies with joints " + ", ".join(parts)
 
 

@@ -276,28 +276,16 @@ class Sides:
     def drive(self, u, void):
         """q (N,) [m³/s] of equation (1a) at the inflows, for the mass balance of the pressure, which leaves out the
         cells `void` (k,); u (N, 3) [m/s]."""
-        rate = np.zeros(len(u))
-        for side in self.now:
-            if not side.is_sea:
-                rate += side.drive(u, void)
-        return rate
+        return self._summed(len(u), False, lambda side: side.drive(u, void))
 
     def drive_of_air(self, phi, u, void):
         """What of `drive` passes above the surface of φ (N,) [m], at dry nodes: (N,) [m³/s]. No air comes with it, so
         that pockets have to do without it."""
-        rate = np.zeros(len(u))
-        for side in self.now:
-            if not side.is_sea:
-                rate += side.drive_of_air(phi, u, void)
-        return rate
+        return self._summed(len(u), False, lambda side: side.drive_of_air(phi, u, void))
 
     def flow_rate(self, phi, u):
         """q (N,) [m³/s] of equation (1) at the nodes of the inflows; phi (N,), u (N, 3) [m/s]."""
-        rate = np.zeros(len(phi))
-        for side in self.now:
-            if not side.is_sea:
-                rate += side.rate(phi, u)
-        return rate
+        return self._summed(len(phi), False, lambda side: side.rate(phi, u))
 
     def exchanged(self, topology, phi, carried):
         """Volume (N,) [m³] that enters from the seas (negative: leaves): the water at their nodes below the level set φ
@@ -313,11 +301,15 @@ class Sides:
 
     def sea_rate(self, phi, u):
         """q (N,) [m³/s] of equation (1) at the nodes of the seas; phi (N,), u (N, 3) [m/s]."""
-        q = np.zeros(len(phi))
+        return self._summed(len(phi), True, lambda side: side.rate(phi, u))
+
+    def _summed(self, n: int, seas: bool, rate: Callable):
+        """(n,) sum of what `rate` gives for each sea, or for each inflow."""
+        total = np.zeros(n)
         for side in self.now:
-            if side.is_sea:
-                q += side.rate(phi, u)
-        return q
+            if side.is_sea == seas:
+                total += rate(side)
+        return total
 
     def add_step(self, volume, head, phi, weight, ahead) -> None:
         """Add the water that entered at the nodes in a step to the totals.
