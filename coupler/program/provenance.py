@@ -47,7 +47,11 @@ def machine() -> dict[str, str | int]:
 
 
 def git_state() -> dict[str, str | bool] | None:
-    """Commit of the checkout and whether files differ from it; None outside of git."""
+    """Commit of the checkout and whether files differ from it; None outside of git, and where the program is installed
+    somewhere inside a checkout of something else, whose commit says nothing about it."""
+    top = _output("git", "-C", str(ROOT), "rev-parse", "--show-toplevel")
+    if not top or Path(top).resolve() != ROOT:
+        return None
     commit = _output("git", "-C", str(ROOT), "rev-parse", "HEAD")
     if not commit:
         return None

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from coupler.commands.benchmark import command
-from coupler.program import extras, process
+from coupler.program import extras, process, provenance
 from coupler.program.provenance import ROOT
 
 HERE = "print(__file__)\n"
@@ -59,6 +59,27 @@ def test_an_installed_program_needs_no_path(monkeypatch, tmp_path):
     monkeypatch.delenv("PYTHONPATH", raising=False)
     monkeypatch.setattr(process, "ROOT", tmp_path)
     assert "PYTHONPATH" not in process.environment()
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="needs git")
+def test_the_commit_of_a_run_is_that_of_the_program_and_of_nothing_around_it(monkeypatch, tmp_path):
+    """A virtual environment often lies in the repository of a user's own project."""
+
+    def git(*words):
+        who = ("-c", "user.name=nobody", "-c", "user.email=nobody@example.org", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    git("init")
+    git("commit", "--allow-empty", "-m", "a project of somebody else")
+    installed = tmp_path / ".venv" / "site-packages"
+    installed.mkdir(parents=True)
+    monkeypatch.setattr(provenance, "ROOT", installed)
+    assert provenance.git_state() is None
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
+    state = provenance.git_state()
+    assert state is not None
+    assert len(state["commit"]) == 40
+    assert state["changed"] is False
 
 
 def test_all_extras_are_here_and_are_those_of_pyproject():
