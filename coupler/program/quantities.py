@@ -32,9 +32,9 @@ def power_of(value: float, unit: str) -> int:
     return min(power, 0) if unit == "s" else power
 
 
-def _digits(value: float) -> str:
-    """Four digits, whole ones without a power of ten."""
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
+def _digits(value: float, count: int = 4) -> str:
+    """So many digits; of numbers below 1e9 all whole ones, without a power of ten, also where rounding adds one."""
+    return f"{value:.0f}" if 10.0**count - 0.5 <= abs(value) < 1e9 else f"{value:.{count}g}"
 
 
 def _power(size: float) -> int:
@@ -49,7 +49,7 @@ def _power(size: float) -> int:
 
 def percent(value: float | None) -> str:
     """A share; a dash for none."""
-    return "–" if value is None else f"{100.0 * value:.3g} %"
+    return "–" if value is None else f"{_digits(100.0 * value, 3)} %"
 
 
 def counted(number: int, noun: str) -> str:
@@ -66,14 +66,14 @@ def moment_of(seconds: float | None) -> str:
     """A time of a run [s] as people say it: 0.568 s rather than 568 ms, so that times of one list compare at sight."""
     if seconds is None or not seconds >= 0.01:
         return quantity(seconds, "s")
-    return f"{seconds:.4g} s"
+    return f"{_digits(seconds)} s"
 
 
 def length(metres: float | None) -> str:
     """A length [m] in m from a decimetre up, below it in mm."""
     if metres is None or not metres >= 0.1:
         return quantity(metres, "m")
-    return f"{metres:.3g} m" if metres < 1000.0 else f"{metres:.0f} m"
+    return f"{_digits(metres, 3)} m"
 
 
 def as_said(value: float | None, unit: str) -> str:
