@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from coupler.commands.cli import app
-from coupler.commands.study.against import compare
+from coupler.commands.study.against import compare, refuse, worse
 from coupler.program.errors import BadCase, ExitCode
 
 
@@ -101,3 +101,20 @@ def test_the_command_leaves_with_the_code(tmp_path):
     assert run(app, ["study", "compare", *place]).exit_code == 3
     assert run(app, ["study", "compare", *place, "--error", "2"]).exit_code == 0
     assert run(app, ["study", *place]).exit_code == 2
+
+
+def test_what_got_worse_is_told_in_the_order_of_the_study():
+    """And not in that of the hashes of names, which differs from process to process."""
+    names = [f"quantity {k}" for k in range(12)]
+    before, now = copy.deepcopy(BEFORE), copy.deepcopy(BEFORE)
+    for study, error in ((before, 0.1), (now, 0.2)):
+        study["quantities"] = [{"name": name, "against": "exact", "finest": None} for name in names]
+        for read in study["points"]:
+            read["readings"] = {name: {"error": error} for name in names}
+    told = worse(before, now, 1.1, 1.2)
+    assert [line.what for line in told] == [f"h {label}: error of {name}" for label in "12" for name in names]
+    for quantity in now["quantities"]:
+        quantity["against"] = "measured"
+    with pytest.raises(BadCase) as refused:
+        refuse(before, now)
+    assert [line.partition(":")[0] for line in refused.value.lines] == names

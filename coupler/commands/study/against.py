@@ -64,8 +64,8 @@ def refuse(before: dict, now: dict) -> None:
         f"{name}: errors against {kinds[0][name][0]} and against {kinds[1][name][0]}"
         + (" (other finest runs)" if kinds[0][name][0] == kinds[1][name][0] else "")
         + " do not compare"
-        for name in kinds[0].keys() & kinds[1].keys()
-        if kinds[0][name] != kinds[1][name]
+        for name in kinds[0]
+        if name in kinds[1] and kinds[0][name] != kinds[1][name]
     ]
     if not _points(before).keys() & _points(now).keys():
         wrong.append("the two studies have no run in common: are they of the same case?")
@@ -90,7 +90,7 @@ def worse(before: dict, now: dict, error: float, cpu: float) -> list[Worse]:
 
 
 def _errors(what: str, before: dict, now: dict, limit: float):
-    for name in before.keys() & now.keys():
+    for name in (name for name in before if name in now):
         old, new = before[name]["error"], now[name]["error"]
         if old is None or not math.isfinite(old):
             continue
