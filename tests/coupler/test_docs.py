@@ -13,6 +13,7 @@ from coupler.commands.offshore.file import Offshore
 from coupler.commands.stress.registry import Measure, Outcome
 from coupler.commands.verify.registry import Result
 from coupler.commands.verify.report import json_line
+from coupler.program.extras import EXTRAS
 from coupler.program.provenance import ROOT
 
 TOP = [
@@ -48,6 +49,12 @@ def paths(table, above=()):
         for entry in value if isinstance(value, list) else [value]:
             if isinstance(entry, dict) and path[-1] not in ("set",):
                 yield from paths(entry, path)
+
+
+def test_the_page_on_installing_has_every_extra():
+    table = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`[a-z`, ]+`) \|", table, flags=re.MULTILINE)
+    assert sorted(re.findall(r"[a-z]+", " ".join(rows))) == sorted(EXTRAS)
 
 
 @each_page
