@@ -184,6 +184,29 @@ def test_a_block_that_strikes_a_held_one_is_stopped_by_it():
     assert np.abs(lines["ground"]).max() < 1e-12
 
 
+def test_a_block_that_hangs_on_a_held_one_is_carried_by_it():
+    """Dry, by a joint and without any contact: what carries the weight is the held block, which is no ground."""
+    blocks = [
+        {"name": "held", "centre": [0.6, 0.25, 0.45], "size": [0.1, 0.1, 0.1], "fixed": True},
+        {"name": "hangs", "centre": [0.6, 0.25, 0.35], "size": [0.1, 0.1, 0.1], "density": 1000},
+    ]
+    errors = []
+    case = scene(
+        structure={"block": blocks},
+        water=None,
+        tank=None,
+        solid=[],
+        joints={"strength": 1e5, "opening_at_failure": 1e-3},
+        time={"end": 0.3, "step_max": 0.01},
+    )
+    _, record = run(case, 0.3, lambda _, record: errors.append(record.momentum.error))
+    lines = record.momentum.lines
+    assert max(errors) < 1e-12
+    np.testing.assert_allclose(lines["held_blocks"][2], 0.3 * G * 1000 * 0.1**3, rtol=1e-2)
+    for name in ("ground", "ground_joints"):
+        assert np.abs(lines[name]).max() < 1e-12
+
+
 def test_what_closes_narrow_openings_has_a_line():
     """A block in falling water of coarse cells: what closes the openings beside it holds the water."""
     errors, held = [], []
