@@ -1,6 +1,7 @@
 """The page that lives: what it knows of runs, who may ask it, and how it behaves in a real browser."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -8,9 +9,11 @@ import time
 import urllib.error
 import urllib.request
 
+import numpy as np
 import pytest
 
 from coupler.commands.watch.command import serving
+from coupler.commands.watch.server import Site
 from coupler.commands.watch.state import Watched, runs_in
 from coupler.program.process import environment
 from coupler.results.history import HistoryTable
@@ -106,6 +109,29 @@ def test_only_who_knows_the_address_may_look_and_stop(tmp_path, sleeper):
         assert not (run / "stop").exists()
         assert ask(address + "stop/0", "POST", **{"X-Confirmed": "yes"})[0] == 200
         assert (run / "stop").exists()
+
+
+def states(site):
+    """What the page is sent now, without the wait between two looks."""
+    site._read = site._searched = -np.inf
+    return json.loads(site.message())
+
+
+def test_a_run_keeps_its_number_when_another_begins_or_ends(tmp_path, sleeper):
+    """Runs are shown in the order of their last change; the number by which one is stopped is another thing, or the
+    wrong run would be stopped by whoever reads the question while another one changes."""
+    first, second = (make_run(tmp_path / "runs" / name, sleeper.pid) for name in ("first", "second"))
+    os.utime(first / "run.json", (1000, 1000))
+    os.utime(second / "run.json", (2000, 2000))
+    site = Site([tmp_path])
+    shown = {state["path"]: state["number"] for state in states(site)}
+    assert list(shown) == [str(second), str(first)]
+    os.utime(first / "run.json", (3000, 3000))
+    third = make_run(tmp_path / "runs" / "third", sleeper.pid)
+    again = {state["path"]: state["number"] for state in states(site)}
+    assert list(again) == [str(third), str(first), str(second)]
+    assert again.items() > shown.items()
+    assert [site.run(str(again[str(path)])).path for path in (first, second, third)] == [first, second, third]
 
 
 def test_the_page_asks_nothing_from_outside():

@@ -35,13 +35,17 @@ POLICY = (
 
 
 class Site:
-    """The watched runs, and the state that was last sent to the page."""
+    """The watched runs, and the state that was last sent to the page.
+
+    A run keeps the number that it got when it was first seen, by which the page asks for its picture and its stop: the
+    order of the runs changes, by the last change of each, while somebody reads the question whether to stop one."""
 
     def __init__(self, places: list[Path], pictures: Pictures | None = None):
         self.places, self.pictures = places, pictures
         self.secret = secrets.token_urlsafe(16)
-        self.runs: list[Watched] = []
-        self._known: dict[Path, Watched] = {}
+        self._seen: list[Watched] = []
+        self._number: dict[Path, int] = {}
+        self._order: list[int] = []
         self._searched = -LOOK
         self._lock = threading.Lock()
         self._message = "[]"
@@ -53,18 +57,25 @@ class Site:
             now = clock.monotonic()
             if now - self._searched >= LOOK:
                 self._searched = now
-                self.runs = [self._known.setdefault(p, Watched(p)) for p in runs_in(self.places)]
+                self._order = [self._number_of(path) for path in runs_in(self.places)]
             if now - self._read >= EVERY:
                 self._read = now
-                states = [run.state() for run in self.runs]
+                runs = [self._seen[number] for number in self._order]
+                states = [{"number": number} | run.state() for number, run in zip(self._order, runs)]
                 self._message = json.dumps(states, ensure_ascii=False)
                 if self.pictures is not None:
-                    self.pictures.consider(self.runs, states)
+                    self.pictures.consider(runs, states)
             return self._message
+
+    def _number_of(self, path: Path) -> int:
+        if path not in self._number:
+            self._number[path] = len(self._seen)
+            self._seen.append(Watched(path))
+        return self._number[path]
 
     def run(self, number: str) -> Watched | None:
         """The run of a number in an address."""
-        return self.runs[int(number)] if number.isdigit() and int(number) < len(self.runs) else None
+        return self._seen[int(number)] if number.isdecimal() and int(number) < len(self._seen) else None
 
 
 def server_of(site: Site, port: int = 0) -> ThreadingHTTPServer:
