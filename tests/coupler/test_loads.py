@@ -7,7 +7,7 @@ import pytest
 
 from coupler.case.case import Case
 from coupler.checks.case import problems
-from coupler.results.loads import BlockLoads, GroupLoads, loads
+from coupler.results.loads import BlockLoads, GroupLoads, _passed, loads
 from coupler.run.run import ARRIVED, _has_arrived, load_of_what_moves
 from coupler.scene.build import build
 from tests.coupler.test_momentum import run, scene
@@ -22,8 +22,8 @@ def parts_of(loads_of_block):
 
 
 def test_parts_add_up_to_mass_times_acceleration():
-    """Free blocks in a dam break, with contact and joints that break: the sum over the step is the change of momentum
-    and of angular momentum about a point, to round-off."""
+    """Free blocks in a dam break, with friction, contact and joints that break: the sum over the step is the change of
+    momentum and of angular momentum about a point, to round-off."""
     rows, seen = np.array([0, 1, 2]), set()
     state = {}
 
@@ -36,8 +36,9 @@ def test_parts_add_up_to_mass_times_acceleration():
         state["before"] = now
         seen.update(name for name, part in found.items() if np.abs(part).max() > 1e-6)
 
-    run(scene(), 0.35, each)
-    assert seen == {"pressure", "contact", "joint", "weight"}
+    fill = [{"lower": [0, 0, 0], "upper": [0.5, 0.5, 0.4]}]
+    run(scene(water={"fill": fill, "walls": "friction", "roughness": 0.002}), 0.35, each)
+    assert seen == {"pressure", "friction", "contact", "joint", "weight"}
 
 
 def test_free_fall_has_its_weight_alone():
@@ -75,7 +76,10 @@ def wall_case(**gauge):
                 ]
             },
             "contact": {"stiffness": 1e6},
-            "gauge": [{"kind": "loads", "name": "w", "on": "wall", "about": [0.53, 0.15, 0.0]} | gauge],
+            "gauge": [
+                {"kind": "loads", "name": "w", "on": "wall", "about": [0.53, 0.15, 0.0]} | gauge,
+                {"kind": "force", "name": "f", "on": "wall", "about": [0.53, 0.15, 0.0]},
+            ],
         }
     )
 
@@ -86,9 +90,9 @@ def test_still_water_on_a_wall():
     assert problems(case) == []
     made = build(case, no_clock)
     try:
-        (gauge,) = made.gauges
+        gauge, of_force = made.gauges
         record = made.coupling.step(0.01)
-        (row,) = gauge.read(made.coupling, record)
+        (row,), alone = gauge.read(made.coupling, record), of_force.read(made.coupling, record)
         middle = made.coupling.structure.centre()
         (own,) = BlockLoads(np.array([0]), ["wall"], middle, ["pressure", "weight"]).read(
             made.coupling, record
@@ -99,6 +103,8 @@ def test_still_water_on_a_wall():
     assert gauge.table == "loads_w"
     assert row["pressure_force_x"] == pytest.approx(force, rel=1e-5)
     assert row["pressure_moment_y"] == pytest.approx(force * depth / 3, rel=1e-4)
+    assert alone["f_force_x"] == pytest.approx(force, rel=1e-5)
+    assert alone["f_moment_y"] == pytest.approx(force * depth / 3, rel=1e-4)
     assert row["total_force_x"] == pytest.approx(force, rel=1e-5)
     assert row["weight_force_z"] == pytest.approx(-2400 * 0.15 * 0.3 * 0.6 * G, rel=1e-9)
     assert row["pressure_impulse_x"] == pytest.approx(0.01 * force, rel=1e-5)
@@ -126,6 +132,15 @@ def test_rows_of_each_block_hold_the_impulses_of_the_group():
     for part in parts:
         total = sum(row["over"] * row[f"{part}_force_x"] for row in written)
         assert total == pytest.approx(sums[f"{part}_impulse_x"], abs=1e-9)
+
+
+def test_a_row_is_due_once_in_each_interval_whatever_rounding_does():
+    """In steps of half an interval every other one has a row, although sums of 0.05 fall short of multiples of 0.1."""
+    time, due = 0.0, []
+    for _ in range(400):
+        before, time = time, time + 0.05
+        due.append(bool(_passed(before, time, 0.1)))
+    assert due == [False, True] * 200
 
 
 def test_accumulated_loads_go_on_from_what_was_saved():

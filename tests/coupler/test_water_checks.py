@@ -400,6 +400,26 @@ def test_energy_that_a_side_can_bring():
     assert both(0.0) == pytest.approx(0.5 * 1000 * 0.2 * 0.3 * (9.81 * 0.3**2 + 0.3))
 
 
+def test_energy_that_a_tide_can_bring_is_that_of_the_time_that_a_wave_takes_through_the_tank():
+    """What has entered by then has had the level of the sea until then; the tide rises from 0.5 m to 0.7 m in 20 s."""
+    tide = {"amplitude": 0.1, "period": 40.0, "high": 20.0}
+    made = case({"sea": [{"side": "x+", "level": 0.6, "tide": tide}]})
+    crossing = (made.tank.upper[0] - made.tank.lower[0]) / np.sqrt(9.81 * 1.0)
+    level = 0.6 - 0.1 * np.cos(np.pi * (5.0 + crossing) / 20.0)
+    expected = 0.5 * 1000 * 0.2 * level * 9.81 * (level - 0.5) ** 2
+    assert coming_energy(made)(5.0) == pytest.approx(expected)
+
+
+def test_energy_that_a_solitary_wave_can_bring_has_the_speed_of_its_surface():
+    """Under a crest the water is faster at the surface than at the bed, from the second order on."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.4, "height": 0.2, "crest": 2.0}
+    crest = SolitaryWave(0.4, 0.2, 9.81, 2.0)
+    bed, top = crest.speed_at(np.array([0.0, 0.6]), 2.0)
+    assert top > 1.05 * bed
+    expected = 0.5 * 1000 * 0.2 * 0.6 * (9.81 * 0.6**2 + 0.6 * top**2)
+    assert coming_energy(case({"fill": [], "inflow": [wave]}))(0.0) == pytest.approx(expected)
+
+
 def test_a_wave_without_its_still_water_is_remarked():
     bore = {"kind": "bore", "side": "x-", "ahead": 0.4, "level": 0.8}
     assert "bore at x- runs into still water up to z = 0.4 m" in remarks(case({"inflow": [bore]}))[0]
