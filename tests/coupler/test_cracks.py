@@ -74,6 +74,38 @@ def test_wide_cracks_and_cracks_of_thick_walls_are_open(cracked):
     assert basins(immersed(thick, "slit")[1]) == 1
 
 
+def test_a_crack_whose_faces_have_slid_by_a_quarter_of_their_depth_is_open(cracked):
+    """However narrow it is: what it would have been closed by lies elsewhere."""
+    structure = cracked(5 * FAILURE)
+    above = np.flatnonzero(structure.centre()[:, 2] > 0.75)
+    for slid, narrow in ((0.9, 1), (1.1, 0)):
+        way = slid * WIDEST * 0.2 - 0.9 * WIDEST * 0.2 * (slid > 1.0)
+        structure.displace(
+            above, np.tile([way, 0, 0], (len(above), 1)), np.tile(np.eye(3), (len(above), 1, 1))
+        )
+        assert len(NarrowCracks(structure, CELL, lumped=True).cracks()) == narrow
+
+
+def test_each_face_of_a_closed_crack_grows_by_half_of_its_largest_opening(cracked):
+    """So that the two meet also where a wall that tilts has opened most."""
+    structure = cracked(5 * FAILURE)
+    above = np.flatnonzero(structure.centre()[:, 2] > 0.75)
+    tilt = 0.02
+    turn = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+    foot = structure.centre()[above].mean(axis=0) * [1, 1, 0] + [0, 0, 0.75 + 5 * FAILURE]
+    arm = structure.centre()[above] - foot
+    structure.displace(above, arm @ turn.T - arm, np.tile(turn, (len(above), 1, 1)))
+    narrow = NarrowCracks(structure, CELL, lumped=False)
+    block, _, half = narrow.faces()
+    table = structure.joint_table()
+    (joint,) = np.flatnonzero(~table.alive)
+    assert sorted(block) == sorted([table.a[joint], table.b[joint]])
+    largest = 5 * FAILURE + 0.1 * np.sin(tilt)  # at the points of the joint, which lie on its rim or inside
+    assert half[0] == half[1]
+    assert 0.75 * largest < 2.0 * half[0] <= largest * (1 + 1e-9)
+    assert 2.0 * half[0] > 1.2 * narrow.cracks().opening[0]
+
+
 def test_crack_handed_to_the_water(cracked):
     """Its polygon lies between the two blocks, the opening is the one now, the blocks are the joint's."""
     structure = cracked(5 * FAILURE)

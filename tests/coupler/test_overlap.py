@@ -147,3 +147,17 @@ def test_one_block_between_the_sides_of_a_tank(tmp_path):
         assert share.max() == pytest.approx(1e-3, rel=0.2)
     finally:
         structure.close()
+
+
+@pytest.mark.parametrize(("share", "soft"), [(0.9, False), (1.1, True)])
+def test_the_lowest_course_of_a_wall_carries_all_those_above(share, soft):
+    """Ten courses of which each alone would press itself in by a tenth of what is too much."""
+    wall = {"name": "wall", "lower": [0, 0, 0], "size": [0.5, 0.2, 2.0], "block": [0.5, 0.2, 0.2]}
+    limit, weight = 0.1, 10 * 2000.0 * 0.5 * 0.2 * 0.2 * 9.81
+    found = case(
+        time={"end": 1},
+        structure={"wall": [wall], "density": 2000.0, "ground": {}},
+        contact={"stiffness": weight / (share * limit * 0.2)},
+        limits={"overlap": limit},
+    )
+    assert len(list(softness_remarks(found))) == soft

@@ -193,7 +193,13 @@ def test_place_of_the_origin_turn_unit_and_datum(tmp_path):
 
 
 def test_holes_are_filled_harmonically_and_only_on_demand(tmp_path):
-    """A plane with a hole is the plane again: it is harmonic."""
+    """A plane with a hole is the plane again: it is harmonic. So is a saddle, if points that are nearer count more."""
+    narrow = 0.5 * Y
+    x, y = np.meshgrid(X, narrow, indexing="ij")
+    saddle = x**2 - y**2
+    holed = saddle.copy()
+    holed[5:9, 3:8] = np.nan
+    np.testing.assert_allclose(filled(holed, X, narrow), saddle, atol=1e-9)
     x, y = np.meshgrid(X, Y, indexing="ij")
     plane = 0.2 * x - 0.4 * y
     holed = plane.copy()
@@ -247,6 +253,15 @@ def test_smoothing_keeps_planes_and_wears_waves_down():
     np.testing.assert_allclose(np.ptp(inner) / 2, np.exp(-0.5 * (2 * np.pi * 3.0 / 10) ** 2), rtol=0.01)
 
 
+def test_smoothing_leaves_level_ground_beside_a_hole_level():
+    """A hole has no weight; as ground at zero it would draw a plain at 7 m down to the sea."""
+    z = np.full((30, 20), 7.0)
+    z[10:15, 8:12] = np.nan
+    found = smoothed(z, np.arange(30.0), np.arange(20.0), 3.0)
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(z))
+    np.testing.assert_allclose(found[np.isfinite(z)], 7.0)
+
+
 def test_cliffs_are_cut_back_to_the_slope_and_nothing_else():
     x, y = np.arange(30.0), np.arange(8.0)
     z = np.where(x[:, None] < 15, 0.0, 10.0) + 0.0 * y
@@ -254,6 +269,35 @@ def test_cliffs_are_cut_back_to_the_slope_and_nothing_else():
     assert np.abs(np.diff(cut, axis=0)).max() <= 2.0 + 1e-12
     np.testing.assert_array_equal(cut[:15], 0.0)
     np.testing.assert_array_equal(cut[20:], 10.0)
+
+
+def test_a_pit_is_cut_back_alike_on_all_sides():
+    """Along the rows and both diagonals of the raster."""
+    x = np.arange(-6.0, 7.0)
+    z = np.full((13, 13), 10.0)
+    z[6, 6] = 0.0
+    cut = flattened(z, x, x, 2.0)
+    for turned in (cut[::-1], cut[:, ::-1], cut.T):
+        np.testing.assert_array_equal(turned, cut)
+    assert cut[6, 9] == 3 * 2.0
+    assert cut[8, 8] == pytest.approx(2 * 2.0 * np.sqrt(2.0))
+
+
+def test_points_written_with_a_few_digits_are_found_in_their_columns(tmp_path):
+    """0.3 over a spacing of 0.1 is 2.9999999999999996: the third column, not the second."""
+    x, y = np.meshgrid(0.1 * np.arange(12), 0.1 * np.arange(9), indexing="ij")
+    z = x - 2.0 * y
+    np.savetxt(tmp_path / "g.xyz", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), fmt="%.1f %.1f %.3f")
+    grid = read_grid(tmp_path / "g.xyz")
+    np.testing.assert_allclose(grid.z, z, atol=1e-9)
+
+
+def test_a_place_in_the_file_and_in_the_tank_is_the_same_place():
+    """A quarter turn counter-clockwise takes what lies east of the pivot north of the origin."""
+    there = HeightMap(X, Y, Z, (3.0, 4.0), (10.0, 20.0), 0.5 * np.pi)
+    np.testing.assert_allclose(there.in_tank(5.0, 4.0), (10.0, 22.0))
+    skew = HeightMap(X, Y, Z, (3.0, 4.0), (10.0, 20.0), 0.3)
+    np.testing.assert_allclose(skew.in_file(*skew.in_tank(X, X[::-1])), (X, X[::-1]))
 
 
 @pytest.mark.parametrize(
