@@ -284,12 +284,14 @@ def test_a_pit_is_cut_back_alike_on_all_sides():
 
 
 def test_points_written_with_a_few_digits_are_found_in_their_columns(tmp_path):
-    """0.3 over a spacing of 0.1 is 2.9999999999999996: the third column, not the second."""
-    x, y = np.meshgrid(0.1 * np.arange(12), 0.1 * np.arange(9), indexing="ij")
+    """101.1 is by rounding a little less than two spacings of 0.2 from 100.7: the second column, not the first. Else
+    they would be taken for scattered points, and the holes of a raster would be filled with triangles."""
+    x, y = np.meshgrid(100.7 + 0.2 * np.arange(12), 0.1 * np.arange(9), indexing="ij")
     z = x - 2.0 * y
     np.savetxt(tmp_path / "g.xyz", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), fmt="%.1f %.1f %.3f")
     grid = read_grid(tmp_path / "g.xyz")
     np.testing.assert_allclose(grid.z, z, atol=1e-9)
+    assert grid.notes == ()
 
 
 def test_a_place_in_the_file_and_in_the_tank_is_the_same_place():
