@@ -40,6 +40,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from array_types import Array
+from fluid.numerics.cube_root import cube_root
 from fluid.sides.inflow import Flow
 
 
@@ -63,13 +64,13 @@ def kept_discharge(
         return h, u
     out, q = -u_inside + 2.0 * np.sqrt(gravity * h_inside), u * h
     # 2 s³ - R_out s² = g q for s = sqrt(g h_side): convex from the start of Newton's method on, beyond the root
-    s = abs(out) + np.cbrt(gravity * q)
+    s = abs(out) + float(cube_root(gravity * q))
     for _ in range(MOST_STEPS):
         step = (s * s * (2.0 * s - out) - gravity * q) / (s * (6.0 * s - 2.0 * out))
         s -= step
         if step <= 1e-14 * s:
             break
-    depth = max(s * s / gravity, np.cbrt(q * q / gravity))
+    depth = max(s * s / gravity, float(cube_root(q * q / gravity)))
     return depth, q / depth
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fluid.sides.absorbing import Absorber, kept_discharge
+from fluid.sides.inflow import Flow
 from fluid.sides.waves import n_wave, steady
 
 G, DEPTH, STEP = 9.81, 2.0, 0.02
@@ -29,6 +30,27 @@ def test_long_wave_of_any_height_goes_out_as_if_the_water_went_on(height):
     flow = side.as_flow()
     assert flow.level(0.0) == pytest.approx(h - 5.0)
     np.testing.assert_allclose(flow.velocity(np.zeros((3, 3)), 0.0), np.tile(-u * INWARD, (3, 1)), atol=1e-12)
+
+
+def test_a_given_flow_that_differs_along_a_side_over_a_slope_is_left_as_it_is():
+    """The mean velocity of both flows is that of their discharge: deep water counts more, in the given flow as inside."""
+
+    def velocity(points, time):
+        return np.column_stack([0.2 + 0.5 * points[:, 1], np.zeros((len(points), 2))])
+
+    side = Absorber(Flow(lambda time: DEPTH, velocity), INWARD, PLACES, np.array([0.0, 1.5]), G)
+    depths = np.array([2.0, 0.5])
+    side.update(depths, velocity(side.points(depths), 0.0), 0.0, STEP)
+    assert side.height == pytest.approx(0.0, abs=1e-12)
+    assert side.speed == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_kept_discharge_has_the_same_bits_at_four_times_the_size():
+    """Lengths times 4 and velocities times 2 are the same flow; roots of powers of two must not change the last bit."""
+    random = np.random.default_rng(1)
+    for h, u, inside, back in random.uniform((0.1, 0.1, 0.05, -1.0), 2.0, (500, 4)):
+        depth, speed = kept_discharge(h, u, inside, back, G)
+        assert kept_discharge(4 * h, 2 * u, 4 * inside, 2 * back, G) == (4 * depth, 2 * speed)
 
 
 def test_given_wave_alone_is_left_as_it_is():
