@@ -27,7 +27,7 @@ FOLDER = "checkpoints"
 KEPT = 2
 LONGEST = 600.0
 """Wall time [s] that a kill may take from a run whose case gives no interval: a tenth of a long run is hours."""
-LAYOUT = 9
+LAYOUT = 10
 """Number of the names, kinds and columns of the arrays; checkpoints of another one are refused."""
 UNSET = (
     "structure/joints/failure_time",

@@ -232,7 +232,7 @@ def _report_verdict(
     case: Case, reported: dict | None, figures: dict, end: float, directory, reporter, is_coupled: bool
 ) -> None:
     """Write the verdict to run.json and the log, however the run ends, with the reasons to doubt it and its loads."""
-    from coupler.verdict.words import sentences, unfinished, unreached, unsettled
+    from coupler.verdict.words import sentences, still_rising, unfinished, unreached, unsettled
 
     doubts = [*thin_remarks(case), *thin_water_remarks(case)]
     doubts += [in_all(figures["tank_top"])] if "tank_top" in figures else []
@@ -244,7 +244,9 @@ def _report_verdict(
     if reported is not None and not _reached(time, end):
         doubts.append(unfinished(time, end))
     elif reported is not None and figures["steps"]:
-        doubts += filter(None, [unreached(reported, time) if is_coupled else None, unsettled(reported, time)])
+        found = [unreached(reported, time) if is_coupled else None]
+        found += [unsettled(reported, time), still_rising(reported, time)]
+        doubts += filter(None, found)
     directory.record(doubts=doubts)
     if reported is not None:
         directory.record(verdict=reported)

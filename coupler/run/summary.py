@@ -100,6 +100,7 @@ class _Group(_Part):
 class _Peak(_Part):
     value: Number
     time: Number
+    of: Text | None = None
 
 
 class _Gone(_Part):

@@ -3,6 +3,7 @@
 damage         shares of joints and weight of a group, and the state they make
 divisions      bodies, walls and storeys of a structure
 pressed        the faces across which the pressure of the water on a block is measured
+trend          whether the load of the water still grows at the end
 depths         the depth of the water beside a structure
 attitude       displacement and tilt of blocks at the end
 rocking        blocks out of their place that their weight turns back

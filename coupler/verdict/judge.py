@@ -42,7 +42,7 @@ def verdict(structure: Structure, watch: Watch) -> dict:
     judged = np.where(watch.judged, 0, -1)
     (whole,) = damage(judged, ["structure"], blocks, joints, watch.rules)
     bodies = of(watch.divisions.bodies)
-    _add_loads(bodies, watch)
+    _complete(bodies, watch)
     members = of(watch.divisions.members)
     return _reported(whole, structure, places) | {
         "rules": asdict(watch.rules),
@@ -53,6 +53,7 @@ def verdict(structure: Structure, watch: Watch) -> dict:
         "order": [m["name"] for m in sorted(_broken(members), key=lambda m: m["first_break"]["time"])],
         "displaced": _displaced(structure, watch, away, rocks),
         "leaving": _leaving(structure, watch),
+        "rising": watch.trend.rising(),
         "hits": _hits(structure, watch),
     }
 
@@ -116,22 +117,31 @@ def _broken(groups: list[dict]) -> list[dict]:
     return [group for group in groups if group["first_break"]]
 
 
-def _add_loads(bodies: list[dict], watch: Watch) -> None:
+def _complete(bodies: list[dict], watch: Watch) -> None:
+    """Add to each body its largest loads, and whether the verdict is about any of its blocks."""
     for body in bodies:
-        body["largest"] = _largest(watch, watch.divisions.bodies.names.index(body["name"]))
+        k = watch.divisions.bodies.names.index(body["name"])
+        body["largest"] = _largest(watch, k)
+        body["judged"] = bool(watch.judged[watch.divisions.bodies.label == k].any())
 
 
 def _largest(watch: Watch, k: int, judged: bool = False) -> dict:
     """Largest force, horizontal force and overturning moment of the water, and depth beside it; None for values that
-    never occurred."""
-    force, push, moment = (_peak(peaks, k) for peaks in (watch.force, watch.push, watch.moment))
+    never occurred.
+
+    Of several judged bodies the moment is that of the one with the largest: about a point amid the houses of a town,
+    the uplift of a single one would count with the width of a street as its lever."""
+    own = np.unique(watch.divisions.bodies.label[watch.judged]) if judged else np.array([k])
+    own = own[own >= 0]
+    turned = int(own[np.argmax(watch.moment.value[own])]) if len(own) > 1 else k
+    force, push, moment = _peak(watch.force, k), _peak(watch.push, k), _peak(watch.moment, turned)
     if force:
         force["direction"] = watch.direction[k].tolist()
     if moment:
-        moment["about"] = watch.foot[k].tolist()
+        moment["about"] = watch.foot[turned].tolist()
+        if len(own) > 1:
+            moment["of"] = watch.divisions.bodies.names[turned]
     if judged:
-        own = np.unique(watch.divisions.bodies.label[watch.judged])
-        own = own[own >= 0]
         k = int(own[np.argmax(watch.depth.value[own])]) if len(own) else 0
     depth = _peak(watch.depth, k) if len(watch.depth.value) else None
     if depth:

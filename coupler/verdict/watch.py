@@ -15,6 +15,7 @@ from array_types import Array, Floats
 from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions
 from coupler.verdict.pressed import Pressed
+from coupler.verdict.trend import Trend
 
 if TYPE_CHECKING:
     from coupler.step.coupled_step import CoupledStepper
@@ -124,6 +125,7 @@ class Watch:
         self.left_at = np.full(n, np.nan)
         self.pressure = Peaks.none(n)
         self.force, self.push, self.moment = (Peaks.none(bodies + 1) for _ in range(3))
+        self.trend = Trend.none()
         self._force_now: Array | None = None
         self.direction, self.impulse = np.zeros((bodies + 1, 3)), np.zeros((bodies + 1, 3))
         self.depth = Peaks.none(bodies)
@@ -172,7 +174,9 @@ class Watch:
         self._force_now = np.linalg.norm(force, axis=1)
         larger = self.force.take(self._force_now, record.time)
         self.direction[larger] = force[larger]
-        self.push.take(np.linalg.norm(force[:, :2], axis=1), record.time)
+        push = np.linalg.norm(force[:, :2], axis=1)
+        self.push.take(push, record.time)
+        self.trend.take(np.array([push[-1], self._force_now[-1]]), record.time, record.dt)
         about_zero = of_body @ (load[:, 3:] + np.cross(centre, load[:, :3]))
         overturning = about_zero - np.cross(self.foot, force)
         self.moment.take(np.linalg.norm(overturning[:, :2], axis=1), record.time)
@@ -257,7 +261,14 @@ class Watch:
         own = {name: getattr(self, name).copy() for name in _OWN}
         blow = {"change": self._blow.change.copy(), "contact": self._blow.impulse.copy()}
         blow["contact_time"] = np.array(self._blow.dt)
-        return {**peaks, **own, **blow, "before": self._before.copy(), "hits": self.hits}
+        return {
+            **peaks,
+            **own,
+            **blow,
+            "before": self._before.copy(),
+            "hits": self.hits,
+            "trend": self.trend.array(),
+        }
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Restore the state that `save` returned."""
@@ -266,6 +277,7 @@ class Watch:
         for name in _OWN:
             setattr(self, name, saved[name].copy())
         self._before = saved["before"].copy()
+        self.trend = Trend.of(saved["trend"])
         self._blow = _Blow(saved["change"].copy(), saved["contact"].copy(), float(saved["contact_time"]))
         self._hits = {(int(row[1]), int(row[2])): tuple(row.tolist()) for row in saved["hits"]}
 

@@ -27,6 +27,7 @@ def sentences(reported: dict) -> Iterator[str]:
     """The verdict line by line; its argument is what `judge.verdict` returns."""
     yield headline(reported)
     yield from _of_bodies(reported["bodies"])
+    yield from _not_judged(reported["bodies"])
     yield from _first_break(reported)
     yield from _order(reported)
     yield from _loads(reported["largest"])
@@ -66,6 +67,21 @@ def unsettled(reported: dict, time: float) -> str | None:
     )
 
 
+def still_rising(reported: dict, time: float) -> str | None:
+    """A sentence where the load of the water on a structure that has not collapsed is at its largest and still grows
+    as the run ends at time [s]; None otherwise."""
+    found = reported["rising"]
+    if found is None or reported["state"] == "collapsed":
+        return None
+    load = "horizontal force" if found["load"] == "horizontal" else "force"
+    return (
+        f"the {load} of the water still grows as the run ends at t = {moment_of(time)}: its mean over about the last "
+        f"twentieth of the run, {quantity(found['recent'], 'N')}, is as large as ever and "
+        f"{found['recent'] / found['long'] - 1.0:.0%} above that over the last fifth; this verdict may come before "
+        "the largest load: raise time.end"
+    )
+
+
 def name_of(reported: dict, name: str) -> str:
     """A wall, floor or storey in words."""
     return in_words(name, {body["name"] for body in reported["bodies"]})
@@ -94,6 +110,19 @@ def _of_bodies(bodies: Sequence[dict]) -> Iterator[str]:
         if names:
             parts.append(f"{len(names)} {of_one if len(names) == 1 else of_several}{which}")
     yield f"of {len(joined)} bodies with joints " + ", ".join(parts)
+
+
+def _not_judged(bodies: Sequence[dict]) -> Iterator[str]:
+    """The bodies that the verdict is not about, with their states: loose blocks beside a structure with joints."""
+    left = [body for body in bodies if not body.get("judged", True)]
+    if not left:
+        return
+    parts = []
+    for word in dict.fromkeys(body["word"] for body in left):
+        names = [body["name"] for body in left if body["word"] == word]
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        parts.append(f"{', '.join(names[:MOST_NAMED])}{more} ({word})")
+    yield f"not judged: {', '.join(parts)}; verdict.on names what is judged, by default what has joints"
 
 
 def _first_break(reported: dict) -> Iterator[str]:
@@ -141,7 +170,8 @@ def _loads(largest: dict) -> Iterator[str]:
     if push:
         parts.append(f"horizontally {at(push, 'N')}")
     if moment:
-        parts.append(f"overturning moment about the middle of its base {at(moment, 'N m')}")
+        whose = f"the base of {moment['of']}" if moment.get("of") else "its base"
+        parts.append(f"overturning moment about the middle of {whose} {at(moment, 'N m')}")
     if depth:
         parts.append(f"depth of water beside it {length(depth['value'])} at {moment_of(depth['time'])}")
     if parts:

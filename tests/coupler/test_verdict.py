@@ -16,7 +16,7 @@ from coupler.verdict.damage import Rules, state_of
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import _largest, places_of, verdict
 from coupler.verdict.watch import Peaks, Watch
-from coupler.verdict.words import _of_bodies, sentences, unreached, unsettled
+from coupler.verdict.words import _loads, _of_bodies, sentences, still_rising, unreached, unsettled
 from tests.coupler.resumed import DRY, begin
 from tests.coupler.test_docs import FIGURES
 from yade_scripts.blocks.block import Block
@@ -252,6 +252,61 @@ def test_a_block_on_its_way_out_as_the_run_ends_is_doubted(scene):
     s.v[1, 0] = 0.05
     s.x[1, 0] -= 0.001  # it swings, and was farther out before
     assert verdict(s, watch)["leaving"] is None
+
+
+@pytest.mark.parametrize(
+    ("load", "grows"),
+    [
+        (lambda t: 100.0, False),
+        (lambda t: 100.0 * t, True),
+        (lambda t: 1000.0 * max(t - 3.9, 0.0), True),
+        (lambda t: 100.0 * min(t, 2.0), False),
+        (lambda t: 500.0 if 1.0 < t < 1.5 else 20.0 * t, False),
+        (lambda t: 100.0 * (1.0 + 0.3 * np.sin(400.0 * t)), False),
+    ],
+    ids=(
+        "still water",
+        "rising",
+        "the front just arrives",
+        "a flood that stands",
+        "after an impact",
+        "trembling",
+    ),
+)
+def test_a_load_that_still_grows_as_the_run_ends_is_doubted(scene, load, grows):
+    """The peak may come later: a wall that the front had just reached stood without a word."""
+    s, watch, coupling = scene
+    for k in range(400):
+        t = 0.01 * (k + 1)
+        watch.step(coupling, record(t, load=[(load(t), 0, 0), (0, 0, 0), (0, 0, 0)]))
+    found = verdict(s, watch)
+    doubt = still_rising(found, 4.0)
+    assert (doubt is not None) == grows
+    if grows:
+        assert "horizontal force of the water still grows as the run ends at t = 4 s" in doubt
+        s.x = s.x + np.array([1.0, 0, 0])
+        watch.step(coupling, record(4.01))
+        assert still_rising(verdict(s, watch), 4.01) is None  # what has collapsed stays so
+
+
+def test_uplift_that_still_grows_is_doubted_too(scene):
+    s, watch, coupling = scene
+    for k in range(400):
+        watch.step(coupling, record(0.01 * (k + 1), load=[(10.0, 0, 100.0 * k), (0, 0, 0), (0, 0, 0)]))
+    assert "the force of the water still grows" in still_rising(verdict(s, watch), 4.0)
+
+
+def test_loose_blocks_beside_a_structure_with_joints_are_named(scene):
+    """A quay wall of loose blocks below a house: the verdict is about the house, and said nothing of the wall."""
+    s, watch, coupling = scene
+    watch.step(coupling, record(0.1))
+    last = "; verdict.on names what is judged, by default what has joints"
+    assert f"not judged: crate (in place){last}" in list(sentences(verdict(s, watch)))
+    s.x = s.x + np.array([[0, 0, 0], [0, 0, 0], [1.0, 0, 0]])
+    watch.step(coupling, record(0.2))
+    found = verdict(s, watch)
+    assert found["state"] == "stands"
+    assert f"not judged: crate (moved){last}" in list(sentences(found))
 
 
 def test_a_block_that_comes_back_has_left_its_place_and_is_no_collapse(scene):
@@ -513,13 +568,16 @@ def test_a_joint_is_placed_at_the_middle_of_its_corners_at_the_start():
     assert places_of(none).shape == (0, 3)
 
 
-def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
+def test_depth_and_moment_are_those_of_a_body_that_is_judged():
     """Three bodies, the first and the second of them judged, and a wall of no body; forces of all that is judged come
     last. The deepest water, beside the third body, does not count, nor does that beside the first, which is shallower
-    than that beside the second."""
+    than that beside the second. The moment is the larger of the two: in a town of five houses that about the middle of
+    them all was 365 kN m, and the largest of a house 14."""
     peaks = Peaks(np.array([0.4, 0.9, 1.5]), np.array([1.0, 2.0, 3.0]))
     watch = SimpleNamespace(
-        divisions=SimpleNamespace(bodies=SimpleNamespace(label=np.array([0, 0, 1, -1, 2]))),
+        divisions=SimpleNamespace(
+            bodies=SimpleNamespace(label=np.array([0, 0, 1, -1, 2]), names=("A", "B", "C"))
+        ),
         judged=np.array([True, True, True, True, False]),
         force=Peaks(np.array([1.0, 2.0, 3.0, 7.0]), np.array([0.1, 0.2, 0.3, 0.7])),
         push=Peaks(np.array([1.0, 2.0, 3.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.6])),
@@ -532,9 +590,13 @@ def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
     assert _largest(watch, 3, judged=True) == {
         "force": {"value": 7.0, "time": 0.7, "direction": [9.0, 10.0, 11.0]},
         "horizontal": {"value": 6.0, "time": 0.6},
-        "moment": {"value": 8.0, "time": 0.8, "about": [-9.0, -10.0, -11.0]},
+        "moment": {"value": 5.0, "time": 0.5, "about": [-3.0, -4.0, -5.0], "of": "B"},
         "depth": {"value": 0.9, "time": 2.0, "place": [2.0, 3.0]},
     }
+    assert "middle of the base of B 5 N m at 0.5 s" in next(_loads(_largest(watch, 3, judged=True)))
+    watch.judged = np.array([True, True, False, True, False])  # of a single body all that is judged counts
+    moment = _largest(watch, 3, judged=True)["moment"]
+    assert moment == {"value": 8.0, "time": 0.8, "about": [-9.0, -10.0, -11.0]}
     assert _largest(watch, 2) == {
         "force": {"value": 3.0, "time": 0.3, "direction": [6.0, 7.0, 8.0]},
         "horizontal": {"value": 3.0, "time": 0.3},
