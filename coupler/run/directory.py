@@ -26,6 +26,7 @@ from coupler.checks.read_case import CaseFile
 from coupler.program import provenance
 from coupler.program.errors import FULL, CannotWrite, ExitCode, RunDirectoryExists
 from coupler.program.failures import Failure
+from coupler.run.fingerprint import ALL_FILE_KEYS, file_digests
 from coupler.run.lock import RunLock
 from coupler.run.summary import read_summary
 
@@ -248,6 +249,7 @@ def _summary(file: CaseFile, content: dict) -> dict:
         "git": provenance.git_state(),
         "figures": {},
         "case": content,
+        "files": file_digests(content, ALL_FILE_KEYS),
     }
 
 

@@ -26,6 +26,7 @@ FREE = (
 """Names of the case that may change when a run goes on; with a dot at the end: a whole section."""
 FILE_KEYS = ("path", "surface")
 """Keys of a case whose values name files, that of the mesh aside, which is compared as a mesh."""
+ALL_FILE_KEYS = (*FILE_KEYS, "mesh")
 
 
 def scene_parts(coupling) -> dict[str, str]:
@@ -59,7 +60,7 @@ def run_inputs(case: dict) -> dict[str, dict[str, str]]:
     """What a run of an effective case reads besides it: digests of the files that it names, that of its mesh included,
     and checksums of joint laws from outside of the program; empty where there is neither."""
     found = {
-        "files": file_digests(case, (*FILE_KEYS, "mesh")),
+        "files": file_digests(case, ALL_FILE_KEYS),
         "laws": _outside_laws(case.get("joints") or {}),
     }
     return {kind: digests for kind, digests in found.items() if digests}

@@ -188,14 +188,9 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int,
     structure = build_structure(case)
     try:
         limit, substep = structure.substep_limit(), structure.substep()
-        rows.append(
-            Row(
-                "blocks",
-                structure.n,
-                "",
-                f"{structure.mass[~structure.fixed].sum() / 1e3:.4g} t that can move",
-            )
-        )
+        mass = float(structure.mass[~structure.fixed].sum())
+        weight = f"{mass:.4g} kg" if mass < 1e3 else f"{mass / 1e3:.4g} t"
+        rows.append(Row("blocks", structure.n, "", f"{weight} that can move"))
         rows.append(Row("joints", joint_counts(structure).intact, "", ""))
         reason = (
             limit.remark(substep) or f"set by {limit.what if case.structure.substep is None else 'the case'}"

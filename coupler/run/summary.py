@@ -196,6 +196,7 @@ class _Summary(_Part):
     cpu_seconds: Number = 0.0
     resumed: list[_Again] = []
     laws: dict[str, dict[str, Text]] = {}
+    files: dict[str, Text] = {}
 
 
 def read_summary(path: Path) -> dict[str, Any]:

@@ -79,6 +79,25 @@ def test_keys_are_paired_by_names_and_a_table_of_one_case_is_one_line():
     }
 
 
+def test_files_are_compared_by_their_contents(tmp_path):
+    """A record that was changed in its place is a difference; the same one in the folder of another case is none."""
+    driven = DRY.replace("velocity = [12, 0, 0]\n", "") + '[[motion]]\nblock = "shot"\npath = "way.csv"\n'
+    found = []
+    for name, speed, case in (("a", 1, "one"), ("b", 1, "two"), ("c", 2, "two")):
+        (tmp_path / case).mkdir(exist_ok=True)
+        (tmp_path / case / "way.csv").write_text(f"time,velocity_x\n0,{speed}\n1,{speed}\n")
+        begin(tmp_path / case, driven, tmp_path / name, "time.end=0.01")
+        found.append(Run(tmp_path / name, name.upper(), read_summary(tmp_path / name)))
+    cases, files = [run.summary["case"] for run in found], [run.files for run in found]
+    assert changes(cases[:2], files[:2]) == []
+    (change,) = changes(cases[1:], files[1:])
+    assert change.key == "motion[0].path"
+    assert change.words()[0] != change.words()[1]
+    assert all(word.startswith("contents ") and word.endswith(" of way.csv") for word in change.words())
+    (change,) = changes(cases[:2], [files[0], {}])  # a run that kept no digests
+    assert change.key == "motion[0].path"
+
+
 def test_a_difference_is_told_against_the_first_run():
     assert Row("", "load", "N", (2000.0, 2500.0, None)).words() == ["2 kN", "2.5 kN (+25.0%)", "–"]
     assert Row("", "load", "N", (-2000.0, -2500.0)).words()[1] == "-2.5 kN (-25.0%)"

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from coupler.case.keys import find
 from coupler.program.quantities import as_said
+from coupler.run.fingerprint import ALL_FILE_KEYS
 
 GIVEN, ABSENT = "given", "absent"
 LONGEST = 40
@@ -28,10 +30,43 @@ class Change:
         return [_words(value, self.unit) for value in self.values]
 
 
-def changes(cases: Sequence[dict]) -> list[Change]:
+def changes(cases: Sequence[dict], files: Sequence[dict[str, str]] = ()) -> list[Change]:
     """The differences between effective cases, in the order of the schema. Tables with names are paired by their names,
-    others by their places; a table that only some cases have is a single line."""
+    others by their places; a table that only some cases have is a single line.
+
+    files: digests of the files that each case names, by their paths; with those of all cases files are compared by
+    their contents, whatever folder they are in, else by their paths."""
+    if compares_contents(cases, files):
+        cases = [_with_contents(case, digests) for case, digests in zip(cases, files)]
     return [Change(key, _unit_of(key), values) for key, values in _differing(tuple(cases), "")]
+
+
+def compares_contents(cases: Sequence[dict], files: Sequence[dict[str, str]]) -> bool:
+    """Whether every case that names files has their digests: runs of earlier versions kept none."""
+    return len(files) == len(cases) and all(
+        digests or not names_files(case) for case, digests in zip(cases, files)
+    )
+
+
+def names_files(value: object) -> bool:
+    """Whether a case names a file."""
+    if isinstance(value, dict):
+        return any(
+            (key in ALL_FILE_KEYS and isinstance(v, str)) or names_files(v) for key, v in value.items()
+        )
+    return isinstance(value, list) and any(map(names_files, value))
+
+
+def _with_contents(value: Any, digests: dict[str, str]) -> Any:
+    """A value of a case in which the paths of files are replaced by their digests and names."""
+    if isinstance(value, dict):
+        return {
+            key: f"contents {digests[v]} of {Path(v).name}"
+            if key in ALL_FILE_KEYS and isinstance(v, str) and v in digests
+            else _with_contents(v, digests)
+            for key, v in value.items()
+        }
+    return [_with_contents(v, digests) for v in value] if isinstance(value, list) else value
 
 
 def _differing(values: tuple[Any, ...], key: str) -> Iterator[tuple[str, tuple[Any, ...]]]:

@@ -21,7 +21,8 @@ def diff(paths: Sequence[Path], to: Path | None, names: Sequence[str], only_json
     """Print how runs differ; with `to`, also write diff.html, diff.json and the figures there. Raises NoRun, BadCase,
     UnknownName."""
     runs = _read(paths)
-    changed, found, curves = changes([run.summary["case"] for run in runs]), rows(runs), chosen(runs, names)
+    changed = changes([run.summary["case"] for run in runs], [run.files for run in runs])
+    found, curves = rows(runs), chosen(runs, names)
     data = content(runs, changed, found, curves)
     print(as_json(data) if only_json else text(runs, changed, found))
     if to is None:

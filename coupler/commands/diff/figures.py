@@ -38,6 +38,11 @@ class Run:
         return dict(self.summary["figures"])
 
     @property
+    def files(self) -> dict[str, str]:
+        """Digests of the files that its case names, by their paths; empty for runs of earlier versions."""
+        return dict(self.summary.get("files", {}))
+
+    @property
     def verdict(self) -> dict[str, Any]:
         """The verdict; empty without one."""
         return self.figures.get("verdict") or {}

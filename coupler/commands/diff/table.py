@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from coupler.commands.diff.case import Change
+from coupler.commands.diff.case import Change, compares_contents
 from coupler.commands.diff.figures import Row, Run
 
 SAME = "the cases are the same, value by value"
 FILES = " (files that they name are compared by their names alone)"
-PATHS = ("path", "surface", "mesh")
-"""Keys of a case that name a file."""
 
 
 def text(runs: Sequence[Run], changed: Sequence[Change], rows: Sequence[Row]) -> str:
@@ -44,13 +42,8 @@ def _aligned(head: Sequence[str], body: Sequence[tuple[str, list[str]]]) -> Iter
 
 def same_case(runs: Sequence[Run]) -> str:
     """The sentence for runs whose cases do not differ."""
-    return SAME + (FILES if _names_files(runs[0].summary["case"]) else "")
-
-
-def _names_files(value: object) -> bool:
-    if isinstance(value, dict):
-        return any((key in PATHS and isinstance(v, str)) or _names_files(v) for key, v in value.items())
-    return isinstance(value, list) and any(map(_names_files, value))
+    cases = [run.summary["case"] for run in runs]
+    return SAME + ("" if compares_contents(cases, [run.files for run in runs]) else FILES)
 
 
 def notes(runs: Sequence[Run]) -> list[str]:
