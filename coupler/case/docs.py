@@ -11,6 +11,7 @@ from typing import get_args
 
 from pydantic import BaseModel
 
+from coupler.case.first_cases import FIRST_CASES
 from coupler.case.keys import Key, find, keys
 from coupler.case.materials import PRESETS, described
 from coupler.program.errors import UnknownName, did_you_mean
@@ -36,7 +37,11 @@ def explanation(name: str | None) -> str:
         if not found:
             raise UnknownName(f"{name}: no such name in a case file{_near(plain)}")
         return "\n".join(
-            [f"'{name}' is no name of a case file; perhaps one of these is meant:", *map(_entry, found)]
+            [
+                f"'{name}' is no name of a case file; perhaps one of these is meant:",
+                *(entry for key in found for entry in entries_of(key)),
+                *_first_cases(plain),
+            ]
         )
     entries = entries_of(key)
     for section in key.sections:
@@ -73,6 +78,10 @@ WORDS = {
     "tsunami": ("water.inflow", "water.inflow.kind", "water.sea"),
     "bore": ("water.inflow", "water.inflow.level", "water.inflow.ahead"),
     "quay": ("solid", "structure.wall"),
+    "wharf": ("solid", "structure.wall"),
+    "sea wall": ("solid", "structure.wall", "contact.uplift"),
+    "seawall": ("solid", "structure.wall", "contact.uplift"),
+    "retaining wall": ("solid", "structure.wall", "contact.uplift"),
     "caisson": ("structure.wall", "structure.block", "contact.pair.friction", "contact.uplift"),
     "breakwater": ("structure.wall", "structure.block", "structure.rubble", "contact.uplift"),
     "sliding": ("contact.friction", "contact.pair", "contact.uplift", "verdict.moved"),
@@ -92,6 +101,11 @@ WORDS = {
     "mortar": ("joints", "joints.strength", "joints.pair"),
     "glue": ("joints",),
     "house": ("structure.building", "structure.drawing", "structure.town"),
+    "warehouse": ("structure.building", "structure.building.opening", "structure.drawing"),
+    "footprint": ("structure.town", "structure.building.outline"),
+    "second wave": ("water.inflow.path", "water.inflow.velocity"),
+    "tide gauge": ("water.inflow.path", "water.inflow.velocity", "water.inflow.zero"),
+    "gauge record": ("water.inflow.path", "water.inflow.velocity", "water.inflow.zero"),
     "drawing": ("structure.drawing", "structure.file"),
     "container": ("structure.block",),
     "box": ("structure.block", "solid", "water.fill"),
@@ -134,6 +148,14 @@ def meant(word: str) -> list[Key]:
     ends = [key for path, key in known.items() if path.rsplit(".", 1)[-1] in (plain, f"{plain}s")]
     entries = [key for key in known.values() if len(plain) > 3 and plain in key.description.lower()]
     return list({key.path: key for key in [*asked, *ends, *entries]}.values())[:MOST_MEANT]
+
+
+def _first_cases(word: str) -> Iterator[str]:
+    """The templates of `init` whose name or line has a word that begins like this one, each with its command."""
+    plain = word.lower().rstrip("s")
+    for name, case in FIRST_CASES.items():
+        if name == plain or any(part.startswith(plain) for part in case.summary.split()):
+            yield f"surgebreak init DIR --template {name}: writes a case to begin with: {case.summary}"
 
 
 def _near(name: str) -> str:

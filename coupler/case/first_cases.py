@@ -152,7 +152,7 @@ FIRST_CASES = {
         lambda answers: {"level": f"{3.0 + to_si(answers['overtopping'], 'm'):g}"},
     ),
     "harbour": FirstCase(
-        "a house on a quay in a bore that comes in through the harbour",
+        "a house on a quay in the bore of a tsunami that comes in through the harbour",
         {
             "height": Question("How high does the bore stand over the still water of the harbour?", "3.5 m"),
             "depth": Question("Depth of the harbour", "4 m"),

@@ -136,8 +136,8 @@ def material_remarks(case: Case) -> Iterator[str]:
         hint = "" if name in PRESETS or name in named else did_you_mean(name, list(PRESETS))
         if hint:
             yield (
-                f"material '{name}' is no preset{hint} As it is, it takes its density from [structure] and its "
-                "joints from [joints]"
+                f"material '{name}' is no preset{hint} As it is, it brings neither a density nor joints of its own: "
+                "these are what the case gives"
             )
     used = presets_of(case)
     given = None if case.joints is None else case.joints.strength

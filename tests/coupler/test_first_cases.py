@@ -1,5 +1,7 @@
 """First cases of `init`: each is a case without a mistake; words that people use are understood."""
 
+import re
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -92,6 +94,16 @@ def test_the_wizard_on_the_command_line(tmp_path):
 )
 def test_words_that_people_use_are_understood(word, name):
     assert f"[{name}]" in explanation(word) or f"\n{name} " in explanation(word)
+
+
+def test_a_word_leads_to_the_first_cases_that_have_it():
+    """Who asks for a quay wants to begin with one; and a name of several kinds is explained for each of them."""
+    templates = {"quay": "quay, harbour", "Containers": "quay", "tsunami": "harbour", "glue": ""}
+    for word, names in templates.items():
+        found = re.findall(r"init DIR --template (\w+): ", explanation(word))
+        assert ", ".join(found) == names
+    of_a_record = "2 (sqrt(g h) - sqrt(g d))"
+    assert of_a_record in explanation("tide gauge")
 
 
 def test_words_lead_to_names_that_there_are():
