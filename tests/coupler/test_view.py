@@ -299,6 +299,18 @@ def test_panels_hold_whole_vectors_of_like_size(tmp_path):
     assert panels == (names[:3] + names[6:], names[3:6])
 
 
+def test_depths_and_places_of_blocks_have_panels_of_their_own(tmp_path):
+    """On the axis of a block that is carried over 2 m the depth of 0.1 m at a gauge is a flat line."""
+    places = [f"top_centre_{axis}" for axis in "xyz"]
+    table = HistoryTable(
+        tmp_path / "gauges.csv", [("time", "s", ""), *((n, "m", n) for n in ("H1_level", *places))]
+    )
+    for k in range(3):
+        table.append(time=k, H1_level=0.05 * k, top_centre_x=1.0 + k, top_centre_y=0.5, top_centre_z=0.5)
+    table.close()
+    assert grouped(read_history(tmp_path / "gauges.csv")) == [("m", ["H1_level"]), ("m", places)]
+
+
 def test_a_figure_of_many_panels_goes_on_where_a_page_of_paper_ends():
     """A figure taller than A4 would be shrunk until its letters cannot be read."""
     from coupler.commands.view.plots import LOW_PANEL, PANEL, TALLEST, leaves

@@ -13,6 +13,7 @@ from coupler.results.history import Column, History, by_block, read_history
 WIDTH = 6.9  # [inch] two columns of a journal
 PANEL, LOW_PANEL = 1.75, 1.05  # [inch] height of a panel, and of one with a pure number
 LINES_PER_PANEL = len(LINES)
+PLACE = "_centre_"  # in the columns of the place of a block
 NEGLIGIBLE = 1e-9  # of the largest change in a table and unit: round-off, not shown
 FLAT = (
     1 / 30
@@ -122,13 +123,14 @@ def grouped(history):
     """Panels [(unit, [column names])] of the numbers that are more than round-off, by unit and size, none too full.
 
     Components of a vector stay together. Pure numbers get a panel each: a count and a share have no scale in common.
+    Places of blocks are apart from depths, which are flat lines beside the length of a tank.
     """
     sizes = {}
     for column in history.columns:
         if column.name != "time" and column.unit:
             size = np.nanmax(np.abs(changed(history, column.name)), initial=0.0)
-            sizes.setdefault(column.unit, {})[column.name] = size
-    return [(unit, names) for unit, named in sizes.items() for names in _panels(named, unit)]
+            sizes.setdefault((column.unit, PLACE in column.name), {})[column.name] = size
+    return [(unit, names) for (unit, _), named in sizes.items() for names in _panels(named, unit)]
 
 
 def _panels(sizes, unit):
