@@ -11,6 +11,8 @@ from array_types import Array, Floats
 from fluid.cut.fans import tetrahedra_of
 from fluid.domain.moments import wet_fraction
 from fluid.domain.point_location import NEAR, Places
+from fluid.numerics.fields import nothing
+from fluid.readings.at_surface import pressure_below_surface
 from fluid.readings.clip import clipped, clipped_triangles, sections, volumes
 from fluid.readings.solid_spans import Spans, solid_spans
 
@@ -175,10 +177,10 @@ def pressure(water, points):
     air, NaN inside a solid. Raises Outside for a point outside the mesh."""
     places = Places.of(water, points)
     in_air = places.read(water.level_set) >= 0.0
-    p = np.where(in_air, 0.0, places.read(water.pressure))
-    if water.air is not None:
-        of_air = water.air.nodal(water.air.mean_pressure)[places.corners]
-        p = np.where(in_air, of_air[np.arange(len(p)), np.abs(of_air).argmax(axis=1)], p)
+    of_air = nothing(len(water.level_set)) if water.air is None else water.air.nodal(water.air.mean_pressure)
+    p = np.where(places.inside, np.nan, pressure_below_surface(water, places, of_air))
+    there = of_air[places.corners]
+    p = np.where(in_air, there[np.arange(len(p)), np.abs(there).argmax(axis=1)], p)
     return p if np.ndim(points) == 2 else float(p[0])
 
 

@@ -41,6 +41,42 @@ def test_air_has_neither_pressure_nor_velocity():
     np.testing.assert_allclose(gauges.velocity(water, points)[:, 0], [1.0, 0.0, 0.0], rtol=1e-12)
 
 
+def test_pressure_up_to_the_surface(pool):
+    """Interpolated between the last node under water and the air at the next, it was up to a quarter of a cell of water
+    too high."""
+    z = np.linspace(0.3, 0.4369, 30)
+    places = np.column_stack([np.full_like(z, 0.31), np.full_like(z, 0.43), z])
+    np.testing.assert_allclose(gauges.pressure(pool, places), 9810 * (0.437 - z), atol=1e-5)
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+@pytest.mark.parametrize(("angle", "depth"), [(0.83, 0.44), (0.4, 0.35), (1.1, 0.52)])
+def test_pressure_at_the_water_line_on_a_block(angle, depth, covers):
+    """Nodes inside the block that lie under the surface, but have only air around them, have no pressure of their
+    own."""
+    block = ConvexBodies.boxes([[0.6, 0.5, 0.3]], [[0.7, 3.0, 0.3]], [rotation([0, 1, 0], angle)])
+    water = tank([1.25, 0.25, 1], 0.125, lambda x: x[:, 2] - depth, block, covers=covers)
+    advance(water, 0.01)
+    random = np.random.default_rng(1)
+    places = random.uniform((0.0, 0.0, depth - 0.125), (1.25, 0.25, depth), (1000, 3))
+    found = gauges.pressure(water, places)
+    free = np.isfinite(found)
+    assert free.sum() > 300
+    np.testing.assert_allclose(found[free], 9810 * (depth - places[free, 2]), atol=1e-4)
+
+
+def test_no_pressure_below_that_of_the_air_beside_it():
+    """Where the pressure rises unevenly with the depth, it would be continued to less at the surface."""
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.437)
+    water.pressure[:] = np.where(
+        water.level_set < 0.0, 1e4 * np.random.default_rng(2).random(len(water.pressure)), 0.0
+    )
+    places = np.random.default_rng(3).uniform((0, 0, 0.376), (1, 1, 0.437), (500, 3))
+    found = gauges.pressure(water, places)
+    assert found.min() == 0.0
+    assert found.max() > 1e3
+
+
 def test_velocity_at_rest(pool):
     assert np.abs(gauges.velocity(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
 
