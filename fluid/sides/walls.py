@@ -135,6 +135,21 @@ class Walls:
         return nodes, projector
 
     @cached_property
+    def closed_row(self) -> Ints:
+        """(N,) row of each node in `nodes`; -1 where it is on no closed side, or water flows through one there."""
+        row = np.full(len(self.open_node), -1)
+        row[self.nodes] = np.arange(len(self.nodes))
+        row[self.flowing], row[self.open_node] = -1, -1
+        return row
+
+    @cached_property
+    def when_dry(self) -> Floats:
+        """`projector` (n, 3, 3) where no side holds the water."""
+        projector = self.projector.copy()
+        projector[self.sticking] = self.slipping
+        return projector
+
+    @cached_property
     def outward(self):
         """Nodes (k,) of the open faces and their unit normals (k, 3) out of the tank."""
         nodes, place = np.unique(self.open_faces, return_inverse=True)

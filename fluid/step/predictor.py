@@ -39,7 +39,7 @@ from fluid.step.remainders import carried_remainder
 from fluid.surface.cavities import air_on_walls
 from fluid.surface.level_set import redistance
 from fluid.surface.volume import VolumeCorrection, correct_volume
-from fluid.transport.advection import transport
+from fluid.transport.advection import Fields, carried
 from fluid.transport.paths_in_solids import levels_in_solids
 from fluid.transport.surface_momentum import share_of_fast
 from kernels.decorators import ranged, released
@@ -222,7 +222,8 @@ def _transported(water, dt, theta, kick, crossing):
     wet = water.walls.wet(water.level_set)
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt, wet)
-    moved = transport(water.topology, water.listed, dt, u_m, u_hat, water.level_set, water.walls.open_node)
+    fields = Fields.of(u_hat, water.level_set)
+    moved = carried(water.topology, water.listed, dt, u_m, fields, water.walls.open_node)
     if water.parameters.advection == "supg":
         from fluid.transport.supg import carried_velocity
 
@@ -236,7 +237,8 @@ def _transported(water, dt, theta, kick, crossing):
     if water.parameters.viscosity > 0.0 or share_of_fast(speeds.in_waves(water, crossing)) > 0.0:
         from fluid.transport.landing import gained
 
-        more, places = gained(water, dt, u_m, water.level_set)
+        fields.renew(water.listed)
+        more, places = gained(water, dt, u_m, fields)
         moved[places, 3] += more
     width = TRANSPORT_WIDTH * water.mesh.spacing
     over(_taken_over, len(moved), water.listed, moved, water.topology.finer, width, u_adv, phi)

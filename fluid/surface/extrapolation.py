@@ -14,8 +14,9 @@ import numpy as np
 from array_types import Bools, Floats
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
-from fluid.numerics.fields import marks_of
+from fluid.numerics.fields import copied_at, marks_of
 from kernels.decorators import inlined, inner, ranged, released
+from kernels.threads import marked as numbers_of
 from kernels.threads import over, owning, reach_of_cells
 
 LINEAR_LAYERS = 2
@@ -261,13 +262,13 @@ def _add_slopes(first, last, runs, cell_list, marked, f, fluid, weight, gradient
                     at[2, 0], at[2, 1], at[2, 2] = at[2, 0] + wx, at[2, 1] + wy, at[2, 2] + wz
 
 
-def smoothed_slope(topology, cell_list, marked, u, calm: float):
+def smoothed_slope(topology, cell_list, marked, u, calm: float, wanted=None):
     """∇u (N, 3, 3) of `mean_gradients` for u (N, 3), averaged over the corners of the cells around a node, each cell
     counts, at the marked nodes of listed cells that are not all marked; zero at other marked nodes, anything at nodes
-    that are not marked. Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average
-    A and n = SWEEPS; between, in between. A wave of many cells passes with an error of the second order of what an
-    average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 %
-    of the energy of waves of 14 cells a period.
+    that are not marked, or not `wanted` (n,), None: all are. Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS
+    Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS; between, in between. A wave of many cells passes with an
+    error of the second order of what an average takes off it, one of a few cells as little as through Aⁿ, which alone
+    took the slope a cell too deep: 2.5 % of the energy of waves of 14 cells a period.
 
     Only nodes of listed cells whose corners are all marked have a field, over which the averages run. Waves of a few
     cells, whose slope the continuation carries to the surface many times too large, grow without averages: by 0.01 to
@@ -285,7 +286,9 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     if sweeps > 1:
         over(_combined, start[1], order, calm, once, before, slope)
     # values are also continued from marked nodes whose other cells with dry corners are not listed
-    over(_clear_unless, len(u), marks_of(order[: start[1]], len(u)), marked, once.reshape(len(u), -1))
+    wanted = numbers_of(marked) if wanted is None else wanted
+    kept = marks_of(order[: start[1]], len(u))
+    over(_clear_unless, len(wanted), wanted, kept, marked, once.reshape(len(u), -1))
     return once
 
 
@@ -295,10 +298,10 @@ def _cells_of(nodes, cell_list, cells, n):
 
 
 @ranged
-def _clear_unless(first, last, kept, marked, field):
-    """field (N, 9) ← 0 at the marked nodes that are not kept, (N,) bool."""
-    for j in range(first, last):
-        i = np.uint64(j)
+def _clear_unless(first, last, wanted, kept, marked, field):
+    """field (N, 9) ← 0 at those of the listed nodes that are marked and not kept, (N,) bool."""
+    for s in range(first, last):
+        i = np.uint64(wanted[np.uint64(s)])
         if marked[i] and not kept[i]:
             for k in range(ENTRIES):
                 field[i, k] = 0.0
@@ -428,12 +431,27 @@ def _fill(t, order, start, linear, f, gradient, done, least):
     continue_outward(order, start, linear, f, gradient, t.nodes, t.around_by_cells, done, least)
 
 
-def continued(topology, layers, wet, wet_cells, u):
-    """u (N, 3) of the nodes `wet` (N,) bool continued over layers (order, start) with its slope, no faster than the
-    neighbours allow."""
-    order, start = layers
-    found, slope = u.copy(), smoothed_slope(topology, wet_cells, wet, u, 0.0)
-    _fill(topology, order, start, LINEAR_LAYERS, found, slope, wet.copy(), np.zeros(len(u)))
+def continued(topology, layers, u, wanted):
+    """u (N, 3) at the wanted nodes (n,) of layers (order, start), continued with its slope from layer 0, no faster than
+    the neighbours allow; anything at others.
+
+    A node takes values and slopes from the layer before, and those of layer 0 come from the nodes around it: what lies
+    farther off than that has no part in it."""
+    t, n, (order, start) = topology, len(u), layers
+    last = len(start) - 2
+    near, steps, _ = layers_around(marks_of(wanted, n), last + 1, *t.around, marks_of(order, n))
+    wet = marks_of(order[: start[1]], n)
+    at_rim = near[wet[near]]
+    found, least = copied_at(near, u), np.empty(n)
+    slope = smoothed_slope(t, t.cells_around(marks_of(at_rim, n)), wet, u, 0.0, at_rim)
+    filled, ends = [], [0, 0]
+    for layer in range(1, last + 1):
+        within = near[: steps[last - layer + 1]]
+        filled.append(within[marks_of(order[start[layer] : start[layer + 1]], n)[within]])
+        ends.append(ends[-1] + len(filled[-1]))
+    filled = np.concatenate(filled)
+    least[filled] = 0.0
+    _fill(t, filled, ends, LINEAR_LAYERS, found, slope, wet, least)
     return found
 
 
@@ -461,11 +479,11 @@ def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced,
     t, (order, start) = topology, layers
     if rubbed is not None:
         wet_cells = wet_cells[~rubbed[t.cells[wet_cells]].any(axis=1)]
-    gradient = smoothed_slope(t, wet_cells, wet, u, calm)
+    gradient = smoothed_slope(t, wet_cells, wet, u, calm, order[: start[1]])
     least = _own_speed(order[start[1] :], 1.0 + WAVE_SLACK * calm, forced)
     _clear_outside(order, u, a)
     _fill(t, order, start, LINEAR_LAYERS, u, gradient, wet.copy(), least)
-    linear, slope = (
-        (LINEAR_LAYERS, smoothed_slope(t, wet_cells, wet, calm * a, calm)) if calm > 0.0 else (0, _NO_SLOPE)
-    )
+    linear, slope = 0, _NO_SLOPE
+    if calm > 0.0:
+        linear, slope = LINEAR_LAYERS, smoothed_slope(t, wet_cells, wet, calm * a, calm, order[: start[1]])
     _fill(t, order, start, linear, a, slope, wet.copy(), _NO_LIMIT)

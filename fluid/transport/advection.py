@@ -13,8 +13,11 @@ never leads through a wall, however thin, because cells at a wall have no neighb
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from array_types import Floats
 from fluid.mesh.arrays import Paths
 from kernels.decorators import inlined, inner, ranged, released
 from kernels.threads import over
@@ -184,13 +187,36 @@ def _limit(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, scra
             out[s, k] = f2 if low <= f2 <= high else f1[i, k]
 
 
+class Fields(NamedTuple):
+    """u [m/s] and φ [m] of all nodes in one array (N, 4) · brought (N, 4): the same until `carried` sets it to what the
+    first path brings to the nodes that it lists."""
+
+    given: Floats
+    brought: Floats
+
+    @classmethod
+    def of(cls, u, phi) -> Fields:
+        """u (N, 3) [m/s] and φ (N,) [m]."""
+        made = cls(*(np.empty((len(phi), 4)) for _ in range(2)))
+        over(_stacked, len(phi), u, phi, *made)
+        return made
+
+    def renew(self, listed) -> None:
+        """Have them carried once more after nodes (n,) have been listed."""
+        over(_renewed, len(listed), listed, *self)
+
+
 def transport(topology, listed, dt: float, u_m, u, phi, on_open_side):
     """u (N, 3) [m/s] and φ (N,) [m] after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, 4).
 
     on_open_side (N,) bool: nodes where water may leave."""
-    n, size, out = len(listed), len(phi), np.empty((len(listed), 4))
-    f, f1, origin = np.empty((size, 4)), np.empty((size, 4)), (np.empty(n, np.uint32), np.empty(n, np.uint8))
-    over(_stacked, size, u, phi, f, f1)
+    return carried(topology, listed, dt, u_m, Fields.of(u, phi), on_open_side)
+
+
+def carried(topology, listed, dt: float, u_m, fields: Fields, on_open_side):
+    """`transport` of fields, of which it sets `brought` at the listed nodes."""
+    n, (f, f1) = len(listed), fields
+    out, origin = np.empty((n, 4)), (np.empty(n, np.uint32), np.empty(n, np.uint8))
     over(_brought, n, listed, dt, u_m, f, topology.paths, origin, f1)
     over(_limited, n, listed, dt, u_m, on_open_side, f, topology.paths, origin, f1, out)
     return out
@@ -204,3 +230,11 @@ def _stacked(first, last, u, phi, f, copy):
         for k in range(3):
             f[i, k] = copy[i, k] = u[i, k]
         f[i, 3] = copy[i, 3] = phi[i]
+
+
+@ranged
+def _renewed(first, last, listed, f, copy):
+    """The copy (N, 4) of f (N, 4) at the listed nodes."""
+    for s in range(first, last):
+        i = np.uint64(listed[np.uint64(s)])
+        copy[i, 0], copy[i, 1], copy[i, 2], copy[i, 3] = f[i, 0], f[i, 1], f[i, 2], f[i, 3]

@@ -25,21 +25,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.surface.extrapolation import LINEAR_LAYERS, continued
-from fluid.transport.advection import transport
+from fluid.numerics.fields import marks_of
+from fluid.surface.extrapolation import continued
+from fluid.transport.advection import Fields, carried
 from fluid.transport.surface_momentum import by_speed
 
 RESOLVED = (10.0, 100.0)
 """|u| h/ν between which this ends where the water is slower than the shallow-water wave of a cell."""
 
 
-def gained(water, dt: float, u, phi):
+def gained(water, dt: float, u, fields: Fields):
     """What φ (n,) [m] of dry nodes on closed sides gains over dt [s] by (2) against the velocity u (N, 3) [m/s] at
-    mid-step, which the sides hold, and their places (n,) in `Water.listed`; φ (N,) [m] before."""
+    mid-step, which the sides hold, and their places (n,) in `Water.listed`; fields: φ before, with any velocity."""
     places, projector = _dry_on_sides(water)
     t, p, nodes = water.topology, water.parameters, water.listed[places]
-    free, size, viscosity = free_velocity(water, u), t.node_size, p.viscosity / p.density
-    fast = np.empty(len(phi))
+    if len(nodes) == 0:
+        return np.zeros(0), places
+    free, size, viscosity = free_velocity(water, u, nodes), t.node_size, p.viscosity / p.density
+    fast = np.empty(len(u))
     by_speed(nodes, free, p.gravity, viscosity, size, fast)
     free = free[nodes]
     share = np.maximum(_share(np.linalg.norm(free, axis=1), viscosity, size[nodes]), fast[nodes])
@@ -48,33 +51,29 @@ def gained(water, dt: float, u, phi):
     if len(nodes) == 0:
         return np.zeros(0), places
     into = free - np.einsum("nij,nj->ni", projector, free)
-    carrying, one_way = u.copy(), np.zeros(len(phi), bool)
-    carrying[nodes] += share[chosen, None] * into[chosen]
     # the way back ends at the side: MacCormack would take half of the change away
-    one_way[nodes] = True
-    held, free = (transport(t, nodes, dt, v, u, phi, one_way)[:, 3] for v in (u, carrying))
+    one_way = marks_of(nodes, len(u))
+    held = carried(t, nodes, dt, u, fields, one_way)[:, 3]
+    fields.renew(nodes)
+    kept = u[nodes]
+    u[nodes] = kept + share[chosen, None] * into[chosen]
+    free = carried(t, nodes, dt, u, fields, one_way)[:, 3]
+    u[nodes] = kept
     return free - held, places
 
 
-def free_velocity(water, u):
-    """u (N, 3) [m/s] with the first layers around the water continued from it as if there were no sides."""
-    t, layers = water.topology, (water.listed, water.layer_start[: LINEAR_LAYERS + 2])
-    wet = np.zeros(len(u), bool)
-    wet[water.listed[: water.layer_start[1]]] = True
-    return continued(t, layers, wet, t.cells_around(wet), u)
+def free_velocity(water, u, nodes):
+    """u (N, 3) [m/s] of these nodes (n,) in the layer around the water, continued from it as if there were no sides;
+    anything at others."""
+    return continued(water.topology, (water.listed, water.layer_start[:3]), u, nodes)
 
 
 def _dry_on_sides(water):
-    """Places (n,) in `Water.listed` of the nodes in the first layers around the water that are on closed sides that
-    none flows through, and projectors (n, 3, 3) onto the directions along these."""
+    """Places (n,) in `Water.listed` of the nodes in the layer around the water that are on closed sides that none flows
+    through, and projectors (n, 3, 3) onto the directions along these."""
     w, start = water.walls, water.layer_start
-    row = np.full(len(w.open_node), -1)
-    row[w.nodes] = np.arange(len(w.nodes))
-    row[w.flowing], row[w.open_node] = -1, -1
-    found = row[water.listed[start[1] : start[2]]]
-    projector = w.projector.copy()
-    projector[w.sticking] = w.slipping
-    return start[1] + np.flatnonzero(found >= 0), projector[found[found >= 0]]
+    found = w.closed_row[water.listed[start[1] : start[2]]]
+    return start[1] + np.flatnonzero(found >= 0), w.when_dry[found[found >= 0]]
 
 
 def _share(speed, viscosity, size):

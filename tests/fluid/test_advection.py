@@ -7,7 +7,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import Background, box_mesh
-from fluid.transport.advection import feet, transport
+from fluid.transport.advection import Fields, carried, feet, transport
 
 
 @pytest.fixture(scope="module", params=["lattice", "jittered"])
@@ -35,6 +35,18 @@ def test_linear_field_in_uniform_flow_is_exact(cube, courant):
     expected = (cube.nodes - dt * u) @ [1.0, 2.0, -1.0]
     expected = np.outer(expected, [2.0, -1.0, 0.5, 1.0])
     np.testing.assert_allclose(moved[inner], expected[inner], atol=1e-12)
+
+
+def test_fields_are_carried_again_once_they_are_renewed(cube):
+    """What the first way brought to some nodes would otherwise be taken for the field itself."""
+    random = np.random.default_rng(4)
+    u, f = random.normal(size=(len(cube.nodes), 3)), random.normal(size=len(cube.nodes))
+    fields, closed, some = Fields.of(u, f), np.zeros(len(f), bool), np.arange(0, len(f), 3)
+    carried(cube, some, 0.1, u, fields, closed)
+    fields.renew(some)
+    others = some[:-1] + 1
+    expected = transport(cube, others, 0.05, u, u, f, closed)
+    np.testing.assert_array_equal(carried(cube, others, 0.05, u, fields, closed), expected)
 
 
 def test_rotation_of_a_smooth_field_converges_faster_than_first_order():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.surface.extrapolation import SWEEPS, smoothed_slope
+from fluid.surface.extrapolation import SWEEPS, continued, smoothed_slope
 from tests.fluid.scenes import tank
 
 
@@ -66,3 +66,18 @@ def test_slopes_are_set_wherever_water_is_continued_from(monkeypatch):
     for calm in (0.0, 0.5):
         found = smoothed_slope(t, cell_list, wet, np.ones((len(wet), 3)), calm)
         assert np.isfinite(found[wet]).all()
+
+
+def test_a_node_is_continued_to_from_what_is_around_it_alone():
+    """The velocity at a few nodes around the water has the digits that it has if the whole layer is continued, which
+    takes a multiple of the time."""
+    post = ConvexBodies.boxes([[0.52, 0.37, 0.4]], [[0.15, 0.25, 0.8]])
+    water = tank([1.0, 0.75, 1.0], 0.125, lambda x: x[:, 2] - 0.5 - 0.2 * x[:, 0], post)
+    u = np.random.default_rng(5).normal(size=water.topology.nodes.shape)
+    for last in (1, 2):
+        layers = (water.listed, water.layer_start[: last + 2])
+        around = water.listed[water.layer_start[last] : water.layer_start[last + 1]]
+        whole = continued(water.topology, layers, u, water.listed[water.layer_start[1] :])
+        for wanted in (around[:1], around[::7]):
+            some = continued(water.topology, layers, u, wanted)
+            np.testing.assert_array_equal(some[wanted], whole[wanted])

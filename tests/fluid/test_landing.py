@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fluid.step.predictor import _transported
+from fluid.transport.advection import Fields
 from fluid.transport.landing import gained
 from tests.fluid.scenes import advance, tank
 
@@ -43,7 +44,7 @@ def test_only_viscous_liquids_are_carried_so_where_they_are_slow():
         water.parameters = replace(
             water.parameters, gravity=100.0
         )  # waves of one cell are three times as fast
-        gain, _ = gained(water, 0.04, water.velocity, water.level_set)
+        gain, _ = gained(water, 0.04, water.velocity, Fields.of(water.velocity, water.level_set))
         shares.append(-gain.min(initial=0.0) / 0.04)
     # half of it at the node, all of it a cell above: 0.5 + 0.5 (0.4 s) is s at the foot of the path
     np.testing.assert_allclose(shares, [1.0, 0.625, 0.0], atol=2e-3)
@@ -54,7 +55,7 @@ def test_fast_water_is_carried_so_as_far_as_its_velocity_follows_its_momentum():
     shares, wave = [], np.sqrt(9.81 * CELL)
     for speed in (1.0, 2.0, 3.0):
         water = slab(0.6, viscosity=0.0, speed=speed * wave)
-        gain, _ = gained(water, 0.04 / speed, water.velocity, water.level_set)
+        gain, _ = gained(water, 0.04 / speed, water.velocity, Fields.of(water.velocity, water.level_set))
         shares.append(-gain.min(initial=0.0) / (0.04 * wave))
     np.testing.assert_allclose(shares[0], 0.0, atol=1e-12)
     np.testing.assert_allclose(shares[2], 1.0, rtol=1e-9)
