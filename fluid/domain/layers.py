@@ -95,20 +95,19 @@ def _beyond(first, last, begun, layer, place, start, around):
     """Neighbours of the nodes of a layer that stand nowhere yet. `begun`: place of the first node of the layer.
 
     What a range has listed it marks as its own in `place`. Another thread may write over the mark; the node is then
-    listed twice, which `_append` sees."""
-    own = np.int32(-2 - begun - first)
-    found, n = np.empty(4 * (last - first) + 64, np.int64), 0
+    listed twice, which `_append` sees. There is room for all neighbours from the start: where a loop may change to a
+    longer array, numba counts references to it in every turn."""
+    own, most = np.int32(-2 - begun - first), 0
     for s in range(first, last):
         i = np.uint64(layer[np.uint64(s)])
-        most = n + np.int64(start[i + np.uint64(1)]) - np.int64(start[i])
-        if most > found.shape[0]:
-            longer = np.empty(2 * most, np.int64)
-            longer[:n] = found[:n]
-            found = longer
+        most += np.int64(start[i + np.uint64(1)]) - np.int64(start[i])
+    found, n = np.empty(most, np.int64), np.uint64(0)
+    for s in range(first, last):
+        i = np.uint64(layer[np.uint64(s)])
         for t in range(start[i], start[i + np.uint64(1)]):
             j = around[t]
             if place[j] < 0 and place[j] != own:
                 place[j] = own
                 found[n] = j
-                n += 1
-    return found[:n]
+                n += np.uint64(1)
+    return found[: np.int64(n)]

@@ -13,14 +13,17 @@ from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from coupler.commands.benchmark.water import dam_break, step
+from fluid.domain.layers import _beyond
 from fluid.domain.moments import _nodal_water, _wet_fraction
 from fluid.pressure.waterline import _differences
 from fluid.surface.extrapolation import _mean_gradients
+from fluid.surface.pools import _trees
 from fluid.surface.volume import _edge_rates, _probed
 from fluid.transport.advection import _brought, _limited
 
 COUNT = re.compile(r"call[^\n]*@NRT_(?:incref|decref)")
 KERNELS = [
+    _beyond,
     _brought,
     _differences,
     _edge_rates,
@@ -28,6 +31,7 @@ KERNELS = [
     _mean_gradients,
     _nodal_water,
     _probed,
+    _trees,
     _wet_fraction,
 ]
 
