@@ -271,3 +271,10 @@ def test_a_slab_between_unequal_blocks_carries_a_thousandfold_mass():
         s.advance(0.5)
         np.testing.assert_allclose(s.centre(), [b.centre for b in blocks], atol=1e-10)
         assert np.abs(s.velocity()).max() < 1e-9
+
+
+def test_the_uplift_of_a_pair_is_that_of_both_materials_and_not_of_one():
+    """Bricks on rock keep the water out; bricks on bricks do not."""
+    law = ContactLaw(uplift=1.0, pairs=(PairFriction("brick", "rock", uplift=0.0),))
+    assert law.uplift_between("brick", "rock") == law.uplift_between("rock", "brick") == 0.0
+    assert law.uplift_between("brick", "brick") == law.uplift_between("rock", "rock") == 1.0

@@ -92,6 +92,18 @@ def test_dashpots_shorten_the_limit():
         assert damped.dt / undamped.dt == pytest.approx(share, rel=1e-9)
 
 
+def test_the_bound_of_one_joint_is_exact_where_its_other_side_does_not_yield():
+    """A block on the ground, and one that hangs on a held block: c = 1. Between two free cubes c = 2 is a bound."""
+    cube, other = two_cubes()
+    found = []
+    for blocks, ground in (([cube], 0.0), ([cube, other.changed(fixed=True)], None), ([cube, other], None)):
+        with Structure(blocks, None, JOINT, ground=ground, gravity=STILL) as s:
+            assert len(s.joints) == 1
+            found.append(s.substep_limit().omega / exact_joint_frequency(s.blocks, s.joints))
+    assert found[:2] == pytest.approx([1.0, 1.0], rel=1e-9)
+    assert 1.0 <= found[2] <= np.sqrt(2.0)
+
+
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_the_limit_with_dashpots_is_where_energy_starts_to_grow(share):
     """As above, with ζ = 1/2 of the joint's first frequency: (√1.25 - 1/2) 2/ω instead of 2/ω."""
