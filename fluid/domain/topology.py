@@ -78,6 +78,7 @@ class Topology:
         nodes = np.ascontiguousarray(domain.nodes)
         start, members = _cells_of_nodes(cells, len(nodes))
         shapes = mesh.shapes
+        divided = (np.bincount(domain.parent_node) > 1)[domain.parent_node]
         share, share_row, fraction, size, node_volume, beside_solid = _measures(
             nodes, cells, background, mesh.cell_volume, mesh.cell_size, domain.volume, domain.part,
             domain.memory.cuts.moments,
@@ -97,7 +98,7 @@ class Topology:
             size=size,
             node_start=start,
             node_cells=members,
-            neighbours=_neighbours_in(mesh, nodes, cells, background),
+            neighbours=_neighbours_in(mesh, divided, cells, background),
             node_volume=node_volume,
             covered=covered_nodes(domain),
             beside_solid=beside_solid,
@@ -116,7 +117,7 @@ class Topology:
             node_size=mesh.node_size[domain.parent_node],
             slanting=mesh.slanting[domain.parent_node],
             sloping_bed=mesh.sloping_bed[domain.parent_node],
-            divided=(np.bincount(domain.parent_node) > 1)[domain.parent_node],
+            divided=divided,
             spacing=mesh.spacing,
         )
 
@@ -319,12 +320,13 @@ def _cells_of_nodes(cells, n):
     return start, members
 
 
-def _neighbours_in(mesh, nodes, cells, parent):
-    """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
-    if len(nodes) > len(mesh.nodes):
+def _neighbours_in(mesh, divided, cells, parent):
+    """neighbours (M, 4); where every node is its background node, those of the parents, renumbered. divided (N,) bool:
+    copies of a node that has several."""
+    if len(divided) > len(mesh.nodes):
         found = np.full(cells.shape, -1, np.int32)
         rows = first_rows(parent, len(mesh.cells))
-        over(_neighbours, len(cells), mesh.neighbours, cells, parent, rows, found, weight=WORK)
+        over(_neighbours, len(cells), mesh.neighbours, cells, parent, rows, divided, found, weight=WORK)
         return found
     if cells is mesh.cells:
         return mesh.neighbours
@@ -337,14 +339,22 @@ def _neighbours_in(mesh, nodes, cells, parent):
 
 
 @ranged
-def _neighbours(first, last, parent_neighbours, cells, parent, start, found):
+def _neighbours(first, last, parent_neighbours, cells, parent, start, divided, found):
     """found (M, 4) ← copies of the parents' neighbours that share the three nodes of the face, where there are any.
+    Where no node of the cell has a further copy, the first copy of the neighbour is known to share them.
 
     start (parents + 1,): first cell of each parent."""
     for e in range(first, last):
+        alone = True
+        for a in range(4):
+            alone = alone and not divided[cells[e, a]]
         for a in range(4):
             p = parent_neighbours[parent[e], a]
             if p < 0:
+                continue
+            if alone:
+                if start[p] < start[p + 1]:
+                    found[e, a] = start[p]
                 continue
             for other in range(start[p], start[p + 1]):  # elements are in the order of their parents
                 shared = 0
