@@ -162,15 +162,14 @@ def wet_fraction(cell_list, phi, parts):
 def _wet_fraction(first, last, cell_list, phi, parts, share):
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells, start = parts.cells, parts.start
-    for s in range(first, last):
+    for place in range(first, last):
+        s = np.uint64(place)
         e = np.uint64(cell_list[s])
-        n_wet = 0
-        for a in range(4):
-            at[a] = phi[cells[e, a]]
-            n_wet += at[a] < 0.0
-        if n_wet == 4 and start[e] == start[e + 1]:
+        a, b, c, d = phi[cells[e, 0]], phi[cells[e, 1]], phi[cells[e, 2]], phi[cells[e, 3]]
+        if a < 0.0 and b < 0.0 and c < 0.0 and d < 0.0 and start[e] == start[e + np.uint64(1)]:
             share[s] = 1.0  # most cells: not worth a call
             continue
+        at[0], at[1], at[2], at[3] = a, b, c, d
         part_moments(e, at, parts, total, local, out)
         share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
 

@@ -352,16 +352,20 @@ def _with_ghosts(first, last, runs, cell_list, state, cells, volume, sums, out):
         up[j], down[j] = 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = np.uint64(cell_list[s])
+            e = np.uint64(cell_list[np.uint64(s)])
+            if wet[cells[e, 0]] and wet[cells[e, 1]] and wet[cells[e, 2]] and wet[cells[e, 3]]:
+                continue
             for a in range(4):
                 j = cells[e, a]
                 if wet[j] or not first <= j < last:
                     continue
+                above, below, outside, size = up[j], down[j], air[j], volume[e]
                 for b in range(4):
                     i = cells[e, b]
                     if wet[i] and not open_node[i]:
-                        up[j] += volume[e] * (pressure[i] - air[j]) * phi[i]
-                        down[j] += volume[e] * phi[i] * phi[i]
+                        above += size * (pressure[i] - outside) * phi[i]
+                        below += size * phi[i] * phi[i]
+                up[j], down[j] = above, below
     for k in range(first, last):
         j = np.uint64(k)
         out[j] = pressure[j]
@@ -378,14 +382,15 @@ def cell_gradient(cell_list, f, cells, parent, g, scale: float = 1.0):
 
 @ranged
 def _cell_gradient(first, last, cell_list, f, cells, parent, g, scale, out):
-    for s in range(first, last):
+    for place in range(first, last):
+        s = np.uint64(place)
         e = np.uint64(cell_list[s])
-        x, y, z = 0.0, 0.0, 0.0
+        p, x, y, z = parent[e], 0.0, 0.0, 0.0
         for a in range(4):
             value = f[cells[e, a]]
-            x += value * g[parent[e], a, 0]
-            y += value * g[parent[e], a, 1]
-            z += value * g[parent[e], a, 2]
+            x += value * g[p, a, 0]
+            y += value * g[p, a, 1]
+            z += value * g[p, a, 2]
         out[s, 0], out[s, 1], out[s, 2] = x * scale, y * scale, z * scale
 
 
@@ -406,15 +411,19 @@ def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
         weight[i], out[i, 0], out[i, 1], out[i, 2] = 0.0, 0.0, 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = np.uint64(cell_list[s])
-            w, row = volume[e] * max(wet_share[s], 1e-6), share_row[e]
+            e, t = np.uint64(cell_list[s]), np.uint64(s)
+            w, row = volume[e] * max(wet_share[t], 1e-6), share_row[e]
+            x, y, z = value[t, 0], value[t, 1], value[t, 2]
             for a in range(4):
                 i = cells[e, a]
                 if first <= i < last:
                     wa = w * max(share[row, a], 1e-9)
                     weight[i] += wa
-                    for k in range(3):
-                        out[i, k] += wa * value[np.uint64(s), k]
+                    out[i, 0], out[i, 1], out[i, 2] = (
+                        out[i, 0] + wa * x,
+                        out[i, 1] + wa * y,
+                        out[i, 2] + wa * z,
+                    )
     for j in range(first, last):
         i = np.uint64(j)
         if weight[i] > 0.0:

@@ -60,20 +60,26 @@ def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out)
     with_one, remainder, kick = held
     kick_time, dt, nu = numbers
     row, end = first_from(with_one, cell_list[first] if first < last else 0), np.uint64(with_one.shape[0])
-    for s in range(first, last):
-        e = np.uint64(cell_list[s])
-        while row < end and with_one[row] < cell_list[s]:
+    for place in range(first, last):
+        s = np.uint64(place)
+        cell = cell_list[s]
+        e = np.uint64(cell)
+        while row < end and with_one[row] < cell:
             row += np.uint64(1)
-        if row == end or with_one[row] != cell_list[s]:
-            for k in range(3):
-                out[s, k] = 0.0
+        if row == end or with_one[row] != cell:
+            out[s, 0], out[s, 1], out[s, 2] = 0.0, 0.0, 0.0
             continue
-        square, own, rate = 0.0, 0.0, 0.0
+        own, rate = 0.0, 0.0
+        for k in range(3):
+            own += remainder[row, k] * remainder[row, k]
+            rate += kick[row, k] * kick[row, k]
+        if own == 0.0 and rate == 0.0:  # near the surface: nothing to carry, whatever the velocity
+            out[s, 0], out[s, 1], out[s, 2] = 0.0, 0.0, 0.0
+            continue
+        square = 0.0
         for k in range(3):
             mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
             square += mean * mean
-            own += remainder[row, k] * remainder[row, k]
-            rate += kick[row, k] * kick[row, k]
         stopped, swept = 4.0 * nu / (size[e] * size[e]), 2.0 * np.sqrt(square) / size[e]
         steady = (stopped + swept) * np.sqrt(own)
         moved = 1.0 if steady * steady >= rate else steady / np.sqrt(rate)

@@ -114,6 +114,10 @@ def _half_ahead(first, last, cells, now, before, share, out):
                 out[e, k] = (1.0 + 0.5 * share) * now[s, k] - 0.5 * share * before[s, k]
 
 
+OTHERS = PAIR.astype(np.uint8)
+"""`PAIR`, unsigned."""
+
+
 @released
 def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, products, around, rate):
     graph_row, start, neighbour = edges.row, edges.start, edges.neighbour
@@ -129,15 +133,14 @@ def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, products, arou
             slot[neighbour[s]], rate[s] = s, 0.0
         for t in range(node_start[i], node_start[i + np.uint64(1)]):
             e = node_cells[t]
-            p, own = parent[e], 0
+            p, own = parent[e], np.uint64(0)
             x, y, z = volume[e] * u_cell[e, 0], volume[e] * u_cell[e, 1], volume[e] * u_cell[e, 2]
             while cells[e, own] != i:
-                own += 1
+                own += np.uint64(1)
             if upright[p]:
-                for a in range(4):
-                    if a == own:
-                        continue
-                    slopes = products[p, PAIR[own, a]]
+                for other in range(1, 4):
+                    a = own ^ np.uint64(other)
+                    slopes = products[p, OTHERS[own, a]]
                     if slopes != 0.0:  # it is zero along half of the edges of a split brick
                         j = cells[e, a]
                         rate[slot[j]] -= slopes * (
