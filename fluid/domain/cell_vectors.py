@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Floats, Ints
-from kernels.decorators import inner, kernel
+from kernels.decorators import inner, kernel, released
+from kernels.threads import found_over
 
 
 class CellVectors(NamedTuple):
@@ -64,6 +65,37 @@ def _carried(cells, values, source, count):
                 taken[k, c] = values[place[source[e]], c]
             k += 1
     return found, taken
+
+
+def places_among(wanted, cells) -> Array:
+    """Places in a list of cells (n,) of those of the wanted ones (k,) that it holds; both ascend."""
+    return found_over(_places_among, len(wanted), wanted, cells)
+
+
+@released
+def _places_among(first, last, wanted, cells):
+    found, n = np.empty(last - first, np.int64), np.uint64(0)
+    row, end, one = (
+        first_from(cells, wanted[first] if first < last else 0),
+        np.uint64(cells.shape[0]),
+        np.uint64(1),
+    )
+    for s in range(first, last):
+        cell, beyond, step = wanted[np.uint64(s)], row, one
+        while beyond < end and cells[beyond] < cell:  # farther and farther on, then back
+            row = beyond + one
+            beyond, step = beyond + step, step + step
+        beyond = min(beyond, end)
+        while row < beyond:
+            middle = (row + beyond) >> one
+            if cells[middle] < cell:
+                row = middle + one
+            else:
+                beyond = middle
+        if row < end and cells[row] == cell:
+            found[n] = row
+            n += one
+    return found[: np.int64(n)].copy()
 
 
 @inner

@@ -20,6 +20,7 @@ from fluid.domain.moments import FluidParts
 from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
 from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradient_rows
+from fluid.numerics.fields import marks_of
 from fluid.numerics.spans import spans
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import over, taken
@@ -218,6 +219,17 @@ class Topology:
     def _touched(self) -> Array:
         """(M,) bool, False again after each use: to fill as many anew would take longer than to go through them."""
         return np.zeros(len(self.cells), bool)
+
+    @cached_property
+    def cut_cells(self) -> Array:
+        """Numbers (k,) of the cells that solids cut, in order."""
+        return np.flatnonzero(self.share_row)
+
+    @cached_property
+    def cells_near_solids(self) -> Array:
+        """Numbers (k,) of the cells with nodes of cut cells and of all that touch them, in order."""
+        touching = marks_of(self.cells[self.cells_around(self.beside_solid)].reshape(-1), len(self.nodes))
+        return self.cells_around(touching)
 
     def in_cells(self, length) -> Array:
         """Lengths (N,) [m] times `finer`; unchanged where all cells are equal."""

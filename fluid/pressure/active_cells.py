@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats, Ints
+from fluid.domain.cell_vectors import places_among
 from fluid.domain.moments import wet_fraction
 from fluid.pressure.indefinite_cells import without_indefinite
-from kernels.decorators import kernel, ranged, released
-from kernels.threads import found_over, over
+from kernels.decorators import kernel, ranged
+from kernels.threads import over
 
 DRY = 1e-9
 """A fluid part that lies above φ = -DRY h holds no water."""
@@ -40,7 +41,8 @@ class WetPart:
         over(_below, len(phi), phi, t.active, below)
         cells = t.cells_around(below)
         holding = _holding(domain, t, phi, -DRY * spacing)
-        dry = found_over(_dry, len(cells), cells, domain.part, holding)
+        cut = places_among(t.cut_cells, cells)
+        dry = cut[~holding[domain.part[cells[cut]]]]
         if t.is_obtuse:
             holds = np.ones(len(cells), bool)
             holds[dry] = False
@@ -60,18 +62,6 @@ def _below(first, last, phi, active, found):
     for j in range(first, last):
         i = np.uint64(j)
         found[i] = phi[i] < 0.0 and active[i]
-
-
-@released
-def _dry(first, last, cells, part, holding):
-    """Places in the list of the cells that are cut and hold no water; part (M,), holding (K,): as in `_holding`."""
-    found, n = np.empty(last - first, np.int64), 0
-    for s in range(first, last):
-        cut = part[cells[s]]
-        if cut >= 0 and not holding[np.uint64(cut)]:
-            found[n] = s
-            n += 1
-    return found[:n].copy()
 
 
 def _holding(d, t, phi, dry):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Bools, Floats
+from fluid.domain.cell_vectors import places_among
 from fluid.pressure.projection import SMALLEST_WET_SHARE, WetCells
 from kernels.decorators import ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells
@@ -95,7 +96,7 @@ def _pushed(first, last, phi, mass, push, u):
                 u[i, k] -= push[i, k] / mass[i]
 
 
-def damp_waterline(wet_cells, weight, line, wet, u, fluid):
+def damp_waterline(wet_cells, weight, line, wet, u, fluid, among=None):
     """u ← u - c (M⁻¹L)² u in place on wet nodes, over the cells beside solids that reach up to φ > deep:
     (L u)_i = Σ_e w_e (u_i - mean of u over the wet corners of e), w_e the water of the cell, M all water around a node.
 
@@ -105,8 +106,8 @@ def damp_waterline(wet_cells, weight, line, wet, u, fluid):
     slows a thin tongue of run-up.
 
     wet_cells: WetCells · weight: c, one or (N, 1) · line: Waterline · wet (N,) bool · u (N, 3) [m/s] ·
-    fluid: FluidCells"""
-    near = _around_waterline(wet_cells.rows, line, fluid.cells)
+    fluid: FluidCells · among (k,): the cells beside solids and all that touch them, in order, at least; None: all"""
+    near = _around_waterline(wet_cells.rows, line, fluid.cells, among)
     if len(near) == 0:
         return
     around = WetCells(wet_cells.rows[near], wet_cells.share[near])
@@ -124,8 +125,12 @@ def _evened(first, last, weight, twice, u):
             u[i, k] -= w * twice[i, k]
 
 
-def _around_waterline(cell_list, line, cells):
-    """Places in the list of the cells beside solids that reach up to φ > deep, and of all that touch them."""
+def _around_waterline(cell_list, line, cells, among=None):
+    """Places in the list of the cells beside solids that reach up to φ > deep, and of all that touch them; among: as in
+    `damp_waterline`."""
+    if among is not None:
+        places = places_among(among, cell_list)
+        return places[_around_waterline(cell_list[places], line, cells)]
     reached = np.zeros(len(line.level_set), bool)
     over(_mark_waterline, len(cell_list), cell_list, line, cells, reached)
     return found_over(_places_beside, len(cell_list), cell_list, reached, cells)

@@ -169,21 +169,21 @@ def _projected(t, kept, gradient, dt):
     gradient (N, 3)."""
     n = len(kept.wet)
     mean = nodal_mean(WetCells(kept.wet_cells, kept.wet_share), gradient, t.fluid_cells, n)
-    u, a, forced = np.empty((n, 3)), zeros((n, 3)), np.empty((n, 3))
+    u, a, forced = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
     over(_after_pressure, n, kept.wet, kept.u_star, mean, kept.advected, kept.theta * dt, (u, a, forced))
     return u, a, forced, mean
 
 
 @ranged
 def _after_pressure(first, last, wet, u_star, mean, advected, time, made):
-    """made: u and a of wet nodes, u* of the others; u* - Π∇x of all."""
+    """made: u and a of wet nodes, u* and zero of the others; u* - Π∇x of all."""
     u, a, forced = made
     for j in range(first, last):
         i = np.uint64(j)
         for k in range(3):
             pushed = u_star[i, k] - mean[i, k]
             forced[i, k] = pushed
-            u[i, k] = u_star[i, k]
+            u[i, k], a[i, k] = u_star[i, k], 0.0
             if wet[i]:
                 u[i, k] = pushed
                 a[i, k] = (pushed - advected[i, k]) / time
@@ -211,11 +211,11 @@ def _damp_surface(water, kept, u, calm) -> None:
     t, h = water.topology, water.mesh.spacing
     phi, wet = t.in_cells(kept.level_set), WetCells(kept.wet_cells, kept.wet_share)
 
-    def even_out(weight, where):
+    def even_out(weight, where, among=None):
         line = Waterline(phi, where, -WATERLINE_DEPTH * h)
-        damp_waterline(wet, weight * calm, line, kept.wet, u, t.fluid_cells)
+        damp_waterline(wet, weight * calm, line, kept.wet, u, t.fluid_cells, among)
 
-    even_out(WATERLINE_DAMPING, t.beside_solid)
+    even_out(WATERLINE_DAMPING, t.beside_solid, t.cells_near_solids)
     if t.slanting.any():
         slow = _share_at_rest(water, u)[:, None]
         for _ in range(BED_ROUNDS):

@@ -86,8 +86,10 @@ def momentum_change(water, problem, unknown, pressure, rows, stages: Stages) -> 
 
     unknown, pressure (N,) [Pa]: x and x + known on wet nodes and seas · rows: `holding_water`."""
     kept, dt = problem.predicted, problem.dt
-    x, p = np.empty(len(unknown)), np.empty(len(unknown))
-    over(_in_water, len(x), kept.wet, unknown, pressure, x, p)
+    x, p = unknown, pressure
+    if kept.held is not None or kept.cushions is not None:  # otherwise there is none outside the water
+        x, p = np.empty(len(unknown)), np.empty(len(unknown))
+        over(_in_water, len(x), kept.wet, unknown, pressure, x, p)
     at = _momenta(water, kept, dt, rows, stages)
     cells, tank, held = _reactions(water, kept, x, p, dt)
     openings = _at_closed_openings(water, kept, p, dt)
@@ -170,8 +172,12 @@ def _momenta(water, kept, dt, rows, stages: Stages) -> dict[str, Array]:
         "weight": (W1, weight),
     }
     found |= {name: (W1, u) for name, u in vars(stages).items()}
-    momenta = momenta_of_rows(rows, parameters.density, list(found.values()), nodes, water.reference)
-    return dict(zip(found, momenta))
+    # without shear, or where no node was limited, two stages are one
+    alike = {name: (id(volume), id(velocity)) for name, (volume, velocity) in found.items()}
+    each = dict(zip(alike.values(), found.values()))
+    momenta = momenta_of_rows(rows, parameters.density, list(each.values()), nodes, water.reference)
+    of_each = dict(zip(each, momenta))
+    return {name: of_each[key] for name, key in alike.items()}
 
 
 @ranged

@@ -131,8 +131,7 @@ class Carried:
         water leaves through: what the fluxes bring there is not yet all that came. Only where some water is fast, or
         there is a jump; `velocity` is overwritten."""
         jumps, share = np.empty(len(phi)), np.empty(len(phi))
-        over(_without, len(phi), self.jumps, t.near_solids, on_open_side, jumps)
-        over(_larger, len(phi), jumps, self.near_fast, on_open_side, share)
+        over(_shares, len(phi), self.jumps, self.near_fast, t.near_solids, on_open_side, jumps, share)
         gained = (correction.nodal_water, held, self.swept)
         pass_on(graph, correction.shift, gained, share, self.water, t.node_volume, self.velocity)
         at_surface = (phi, t.node_size, t.near_solids)
@@ -172,19 +171,13 @@ def _mixed(first, last, nodes, volumes, weights, at_surface, on_open_side, carri
 
 
 @ranged
-def _without(first, last, weight, some, others, out):
-    """weight (N,), zero at nodes that are in one of two sets (N,) bool."""
+def _shares(first, last, weight, fast, near_solids, on_open_side, jumps, larger):
+    """The weight around jumps (N,), zero near solids and on open sides, and the larger of that and the one in fast
+    water (N,), which does not count on open sides."""
     for j in range(first, last):
         i = np.uint64(j)
-        out[i] = 0.0 if some[i] or others[i] else weight[i]
-
-
-@ranged
-def _larger(first, last, one, other, excepted, out):
-    """The larger of two weights (N,), only the first where `excepted` (N,) bool."""
-    for j in range(first, last):
-        i = np.uint64(j)
-        out[i] = one[i] if excepted[i] else max(one[i], other[i])
+        out = 0.0 if near_solids[i] or on_open_side[i] else weight[i]
+        jumps[i], larger[i] = out, out if on_open_side[i] else max(out, fast[i])
 
 
 @released

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fluid.domain.cell_vectors import CellVectors
+from fluid.domain.cell_vectors import CellVectors, places_among
 from fluid.numerics.fields import added, copied_at, less
 from fluid.step.remainders import carry_remainder
 from kernels.threads import use
@@ -66,5 +66,20 @@ def test_fields_that_threads_share_are_those_of_numpy(threads):
         np.testing.assert_array_equal(added(b, c), b + c)
         np.testing.assert_array_equal(less(b, c), b - c)
         np.testing.assert_array_equal(copied_at(np.array([3, 99_000]), a)[[3, 99_000]], a[[3, 99_000]])
+    finally:
+        use(1)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_places_of_wanted_cells_in_a_list(threads):
+    """Whatever the gaps in both, at their ends and where nothing is wanted or listed."""
+    random = np.random.default_rng(6)
+    use(threads, least=1)
+    try:
+        for n, k in ((0, 5), (5, 0), (1, 1), (3000, 20), (20, 3000), (500, 500)):
+            cells = np.flatnonzero(random.random(4000) < n / 4000)
+            wanted = np.flatnonzero(random.random(4000) < k / 4000)
+            expected = np.flatnonzero(np.isin(cells, wanted))
+            np.testing.assert_array_equal(places_among(wanted, cells), expected)
     finally:
         use(1)
