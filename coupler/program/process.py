@@ -34,12 +34,12 @@ def run_module(module: str, *words: object, **options: Any) -> subprocess.Comple
     return subprocess.run(command, **{"check": False, "env": environment(), **options})
 
 
-def end_with(parent: int, number: int = signal.SIGTERM) -> None:
-    """To be called in a child process: have the system send it the signal when the thread that started it ends. parent:
+def end_with(parent: int) -> None:
+    """To be called in a child process: have the system send it SIGTERM when the thread that started it ends. parent:
     process id of the parent, which may have ended already."""
-    _LIBC.prctl(PR_SET_PDEATHSIG, number)
+    _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
-        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), signal.SIGTERM)
 
 
 def rows_of_module(module: str, id: str, limit: float, *words: object) -> tuple[list[dict], str]:

@@ -76,10 +76,10 @@ def table(group, name, dtype=np.int64, width=None):
     )
 
 
-def growing(group, name, first, chunk=None):
-    """A compressed growing array shaped and typed like `first` (n, ...); one chunk holds `chunk` (default n) rows."""
+def growing(group, name, first):
+    """A compressed growing array shaped and typed like `first` (n, ...); one chunk holds n rows."""
     tail = first.shape[1:]
-    chunk = max(1, len(first) if chunk is None else chunk)
+    chunk = max(1, len(first))
     return group.create_dataset(
         name,
         shape=(0, *tail),

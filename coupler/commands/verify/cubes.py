@@ -16,7 +16,7 @@ from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
-from yade_scripts.contact.law import ContactLaw, PairFriction
+from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 
 EDGE, RESERVOIR, DEPTH = 0.15, 3.5, 0.4
@@ -62,12 +62,8 @@ def stacked_cubes():
     yield Finding("top cube, time at which its centre is below one edge [s]", found, landed, 0.15, False)
 
 
-def cubes(
-    cell: float, until: float, finer: tuple = (), bed: float = FRICTION, between: float = FRICTION
-) -> tuple[np.ndarray, np.ndarray]:
-    """(t (n,), centres (n, 3, 3) from the gate) of the cubes, bottom to top.
-
-    finer: regions of `refined_mesh` · bed, between: coefficients of friction on the bed, between the cubes."""
+def cubes(cell: float, until: float, finer: tuple = ()) -> tuple[np.ndarray, np.ndarray]:
+    """(t (n,), centres (n, 3, 3) from the gate) of the cubes, bottom to top; finer: regions of `refined_mesh`."""
     size, mesh = _tank(cell, finer)
     blocks = [
         Block(
@@ -75,11 +71,10 @@ def cubes(
             (RESERVOIR + 1.70 + 0.5 * EDGE, 0.5 * size[1], (i + 0.5) * EDGE),
             size=EDGE,
             density=800.0,
-            material="cube",
         )
         for i in range(3)
     ]
-    contact = ContactLaw(2e5, 0.3, bed, pairs=(PairFriction("cube", "cube", between),))
+    contact = ContactLaw(2e5, 0.3, FRICTION)
     sides = [FixedPlane((0, y, 0), (0, s, 0), f"side {s}") for y, s in ((0.0, 1.0), (size[1], -1.0))]
     with Structure(blocks, contact, ground=0.0, planes=sides) as s:
         c = _stepper(mesh, s, [], 2)

@@ -112,10 +112,10 @@ def piston() -> Iterator[Measure]:
     yield Measure("pressure", float(np.abs(flow.coupling.water.pressure).max()), 1e7, "Pa")
 
 
-def wave_on_wall(strength: float, opening: float = 2e-3, closing: float = 1.0, width: float = 0.8):
+def wave_on_wall(strength: float, closing: float = 1.0, width: float = 0.8):
     """(structure, coupling): a column `width` [m] wide breaks in front of a wall of joined blocks at 1.5 m."""
     blocks = wall_of_blocks("wall", (1.5, -0.001, 0.0), (0.2, 0.502, 1.0), (0.2, 0.251, 0.25), density=1500.0)
-    joints = JointParameters(strength, opening, closing_ratio=closing, damping=0.02)
+    joints = JointParameters(strength, 2e-3, closing_ratio=closing, damping=0.02)
     structure = Structure(blocks, ContactLaw(None, 0.2, 0.5), joints, ground=0.0)
     c = tank((2.5, 0.5, 1.25), (20, 4, 10), column(width, 0.9), structure, rtol=1e-8, covers="multiple")
     return structure, c

@@ -50,9 +50,9 @@ def very_slender_cells() -> Iterator[Measure]:
         yield from flow.measures(name, energy=0.05)
 
 
-def drop_at(height: float, radius: float = 0.15):
-    """Fill: a ball of water in the air."""
-    return lambda x: np.linalg.norm(x - np.array([0.5, 0.5, height]), axis=1) - radius
+def drop_at(height: float):
+    """Fill: a ball of water in the air, 0.15 m in radius."""
+    return lambda x: np.linalg.norm(x - np.array([0.5, 0.5, height]), axis=1) - 0.15
 
 
 @scene("W23", "a drop of three cells falls and bursts on the floor")
