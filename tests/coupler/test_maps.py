@@ -272,3 +272,16 @@ def test_every_map_shows_solids_and_blocks_in_their_places(tmp_path, drawn):
         assert [n for n in shown if n] == [1, 1, 2, 2]
     (legend,) = drawn[0].legends
     assert [text.get_text() for text in legend.get_texts()] == ["fixed solids", "blocks at the start"]
+
+
+def test_the_map_of_the_depth_names_the_buildings(tmp_path, drawn):
+    """Five squares without names could not be found in the table of buildings; hundreds of names would hide the map."""
+    small_maps(tmp_path)
+    rows = ["name,x,y,state", *(f"H{k},{0.2 * k},1,stands" for k in range(5))]
+    (tmp_path / "buildings.csv").write_text("\n".join(rows), encoding="utf-8")
+    draw(tmp_path, tmp_path / "map.png", "a site")
+    named = [[t.get_text() for t in axis.texts if t.get_text()[0] == "H"] for axis in drawn[0].axes[:4]]
+    assert named == [[f"H{k}" for k in range(5)], [], [], []]
+    (tmp_path / "buildings.csv").write_text("\n".join(rows[:1] + rows[1:] * 20), encoding="utf-8")
+    draw(tmp_path, tmp_path / "map.png", "a site")
+    assert not drawn[1].axes[0].texts

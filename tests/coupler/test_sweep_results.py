@@ -371,7 +371,7 @@ def test_runs_that_all_change_at_one_intensity_are_refused_in_words_that_fit_it(
     assert "no run below 0.9 reached 'cracked', every run above did, and of those at 0.9 some" in said
 
 
-def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
+def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made, capsys):
     """Deterministic runs are separable: the dispersion of a fit would be that of nothing."""
     alike = SWEEP.replace(
         'distribution = "lognormal"\nmedian = "1 MPa"\ndispersion = 0.4', 'values = ["1 MPa"]'
@@ -382,6 +382,8 @@ def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
     assert reported["curves"] == []
     assert "perfectly separated" in reported["refused"]
     assert "draw strengths" in reported["refused"]
+    finish(spec, stopped=False)
+    assert f"note: no curve of fragility '{reported['name']}': perfectly separated" in capsys.readouterr().out
 
 
 def test_a_state_that_nobody_reached_is_left_out_and_reported(made):

@@ -268,7 +268,8 @@ def finish(spec: Spec, stopped: bool) -> ExitCode:
     for path in write_tables(spec, results):
         print(f"table: {path}")
     if any(record["outcome"] != "not yet" for record in results.records):
-        page.analyse(spec, results)
+        for sentence in page.analyse(spec, results):
+            print(f"note: {sentence}")
         reason = missing("sweep") or pictures.figures("coupler.commands.view.sweep", spec.folder)
         if reason:
             print(f"note: no figures: {reason}")

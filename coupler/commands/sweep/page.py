@@ -34,10 +34,13 @@ MOST_ROWS = 400
 FAILED = ("refused", "diverged", "gave up", "stopped", "killed", "crashed", "lost")
 
 
-def analyse(spec: Spec, results: Results) -> None:
-    """Write fragility.json and sensitivity.json, which page and figures are made from."""
-    write_json(spec.folder / "fragility.json", [curves(spec, results, f) for f in spec.sweep.fragility])
+def analyse(spec: Spec, results: Results) -> list[str]:
+    """Write fragility.json and sensitivity.json, which page and figures are made from; a sentence for each fragility
+    without a curve, with the reason."""
+    found = [curves(spec, results, f) for f in spec.sweep.fragility]
+    write_json(spec.folder / "fragility.json", found)
     write_json(spec.folder / "sensitivity.json", sensitivities(spec, results))
+    return [f"no curve of fragility '{f['name']}': {f['refused']}" for f in found if f["refused"]]
 
 
 def write(spec: Spec, results: Results) -> Path:

@@ -29,6 +29,8 @@ NOWHERE = "no water", "no dry ground was reached"
 """What a map without a value says, and that of the arrival."""
 FIXED = "#6b6b6b"
 """Colour of fixed solids, darker than that of dry ground."""
+MOST_NAMED = 40
+"""Buildings whose names still find room on a map."""
 STATES = {"stands": "#2a9d5c", "damaged": "#f2a73b", "collapsed": "#c8322b"}
 
 
@@ -79,12 +81,14 @@ def draw(run: Path, picture: Path, title: str) -> None:
             xlim=(x[0], x[-1]),
             ylim=(y[0], y[-1]),
         )
+    if len(houses) <= MOST_NAMED:
+        _write_names(axes[0, 0], houses)
     if houses or blocks or solids:
         figure.legend(
             *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8
         )
     figure.suptitle(title)
-    figure.savefig(picture, dpi=110)
+    figure.savefig(picture, dpi=150)
 
 
 def _draw_outlines(axis, outlines: list[np.ndarray], colour: str, label: str) -> None:
@@ -97,6 +101,23 @@ def _draw_outlines(axis, outlines: list[np.ndarray], colour: str, label: str) ->
                 PolyCollection(outlines, facecolors=fill, edgecolors=fill, linewidths=width, zorder=order)
             )
         axis.plot([], [], "s", color=colour, markeredgecolor=INK, markersize=8, label=label)
+
+
+def _write_names(axis, houses: list[dict]) -> None:
+    """The name of each building beside it, by which it is found in the table of buildings."""
+    from matplotlib.patheffects import withStroke
+
+    for house in houses:
+        axis.annotate(
+            house["name"],
+            (float(house["x"]), float(house["y"])),
+            xytext=(7.0, 5.0),
+            textcoords="offset points",
+            fontsize=7,
+            color=INK,
+            path_effects=[withStroke(linewidth=2.0, foreground=PAPER)],
+            zorder=4,
+        )
 
 
 def in_tank(run: Path, found: Map) -> tuple[np.ndarray, np.ndarray]:
