@@ -42,9 +42,8 @@ def test_thresholds_of_the_covers_close_narrow_openings():
     assert found.volume == pytest.approx(0.94 * 0.5 * 0.5, rel=0.05)
 
 
-def test_a_chamber_in_fine_cells_of_a_large_tank_is_found():
-    """It is a third of a mean cell of the tank and 57 of those around it: it was taken for a gap between blocks."""
-    inner, wall = 0.12, 0.05
+def chamber(inner, wall=0.05):
+    """Six plates around a cube of water with edges of `inner` [m] in the middle of a cubic metre."""
     boxes = []
     for k in range(3):
         for side in (-0.5, 0.5):
@@ -52,9 +51,23 @@ def test_a_chamber_in_fine_cells_of_a_large_tank_is_found():
             middle[k] += side * (inner + wall)
             size[k] = wall
             boxes.append((middle, size))
-    bodies = ConvexBodies.boxes(*map(np.array, zip(*boxes)))
+    return ConvexBodies.boxes(*map(np.array, zip(*boxes)))
+
+
+@pytest.mark.parametrize(("inner", "count"), [(0.11, 0), (0.14, 1)])
+def test_a_gap_smaller_than_a_cell_is_no_chamber(inner, count):
+    """Stacked blocks have many of them. The cells have edges of 0.125 m."""
+    mesh = box_mesh((0, 0, 0), (1, 1, 1), 0.125)
+    water = Water(mesh, cut_domain(mesh, chamber(inner), "multiple"), lambda x: x[:, 2] - 0.85)
+    assert len(closed_off(water)) == count
+
+
+def test_a_chamber_in_fine_cells_of_a_large_tank_is_found():
+    """It is a third of a mean cell of the tank and 57 of those around it: it was taken for a gap between blocks."""
+    inner = 0.12
     mesh = refined_mesh(box_mesh((0, 0, 0), (8, 8, 1), 0.25), [InBox((0.3, 0.3, 0.3), (0.7, 0.7, 0.7), 3)])
     assert inner**3 < mesh.spacing**3
-    (found,) = closed_off(Water(mesh, cut_domain(mesh, bodies, "multiple"), lambda x: x[:, 2] - 0.85))
+    domain = cut_domain(mesh, chamber(inner), "multiple")
+    (found,) = closed_off(Water(mesh, domain, lambda x: x[:, 2] - 0.85))
     assert found.volume == pytest.approx(inner**3, rel=1e-6)
     np.testing.assert_allclose(found.place, 0.5, atol=1e-6)
