@@ -189,3 +189,16 @@ def test_a_column_with_next_to_no_open_area_keeps_its_depth():
     mesh = box_mesh(np.zeros(3), [4.0, 4.0, 2.0], 0.5)
     found, _ = depths(mesh, [([2.0, 2.0, 1.0], [2.0 - 1e-6, 2.0 - 1e-6, 3.0])], 1.5)
     np.testing.assert_allclose(found, 1.5, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("there", "factor"), [(2.0, 0.5), (1.0, 1.0), (0.5, 2.0), (0.25, 4.0), (0.1, 4.0), (0.0, 4.0)]
+)
+def test_the_stress_of_a_stream_is_put_on_water_at_the_bed_that_has_a_quarter_of_its_speed_at_least(
+    there, factor
+):
+    """τ = ρ C_f |U| U is linear in u at the bed: C_f |U|²/|u| has no bound where that water stands."""
+    friction = WallFriction(None, 0.03, 1000.0, 9.81)
+    one = np.ones(1)
+    found = friction._bed(2.0 * one, 0.1, np.zeros((1, 3)), one, there * one)
+    assert found == pytest.approx(factor * 9.81 * 0.03**2 / 2.0 ** (1.0 / 3.0))
