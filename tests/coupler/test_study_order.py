@@ -24,7 +24,7 @@ def test_the_slope_of_a_power_is_its_exponent(p, sizes, C):
     assert last_slope(sizes, errors) == pytest.approx(p, rel=1e-6)
 
 
-@given(p=ORDERS, sizes=SIZES, limit=st.floats(-10.0, 10.0))
+@given(p=st.floats(0.3, 3.9), sizes=SIZES, limit=st.floats(-10.0, 10.0))
 def test_three_runs_tell_the_order_without_the_limit(p, sizes, limit):
     values = [limit + 3.0 * (h / sizes[0]) ** p for h in sizes]
     assert three_run_order(sizes, values) == pytest.approx(p, rel=1e-3)
@@ -176,3 +176,8 @@ def test_curves_that_do_not_cover_one_another_have_no_distance(tmp_path, end, po
     (tmp_path / "ref.csv").write_text(f"# who\nt,v,low,high\n{rows}")
     with pytest.raises(NotRecorded, match=why):
         against_curve(measured(tmp_path, window=window), Curve(np.linspace(0.0, end, 50), np.full(50, 1.9)))
+
+
+def test_a_value_that_meets_the_finest_by_chance_gives_no_order():
+    """Impulses that differ by 7.2 and 0.67 % from the finest, on cells of 75 and 60 mm: 9.9 is no order."""
+    assert np.isnan(three_run_order((0.075, 0.06, 0.05), (1.0721, 1.00671, 1.0)))

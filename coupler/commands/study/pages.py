@@ -30,7 +30,7 @@ with its settings in all of them ("50 mm / 10 ms / 2").
 A setting counts as the cheapest only if all finer runs of its ladder are at least as accurate as required, because
 a coarse run may be accurate by chance. The order of convergence is the slope of the errors where there is an exact
 solution. Otherwise it follows from the differences of the three finest runs, and none is given where these
-differences do not decrease.
+differences do not decrease, or where it would be above 4, twice that of the schemes.
 
 The cost of a part of the program is the difference between two runs, the case with this part and without it.
 Differences within the scatter of CPU times (about 10 % on a busy machine, and 0.3 s for short runs) are not
