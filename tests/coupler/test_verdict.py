@@ -261,7 +261,7 @@ def test_a_block_on_its_way_out_as_the_run_ends_is_doubted(scene):
         (lambda t: 100.0 * t, True),
         (lambda t: 1000.0 * max(t - 3.9, 0.0), True),
         (lambda t: 100.0 * min(t, 2.0), False),
-        (lambda t: 500.0 if 1.0 < t < 1.5 else 20.0 * t, False),
+        (lambda t: 500.0 if 1.0 < t < 1.5 else 10.0 * t * t, False),
         (lambda t: 100.0 * (1.0 + 0.3 * np.sin(400.0 * t)), False),
     ],
     ids=(
