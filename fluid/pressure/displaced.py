@@ -3,7 +3,8 @@
 On a short way w over its wetted surface a body takes ∫_{φ<0} N_i w·n dA from the water at node i. G w is the integral
 over the polygons of wet cells whole, so that of what lies above the surface is taken off.  (The share of water at a
 node in place of this took water from nodes just below a block that flew above a pool, and moved its surface: 0.3 mJ in
-the first steps of a block of 35 g.)
+the first steps of a block of 35 g.)  Only what lies above the surface in cells around nodes that wet cells of the wall
+touch, too, is looked at: from the others nothing is taken, exactly.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.hats import POLYGON, hats_at, value_at
-from fluid.domain.moments import marked_corners
 from fluid.pressure.waterline import relative_area, wet_triangles
 from kernels.decorators import inner, kernel, released
 from kernels.threads import over
@@ -22,8 +22,8 @@ def taken_from_nodes(domain, coupling, phi: Array, way: Array) -> Array:
     """Volume (N,) [m³], negative where the body leaves room.
 
     domain: PhysicalDomain · coupling: its G · phi (N,) [m] · way (n_bodies, 6) [m, rad]."""
+    at, reached = _above_water(domain.face_cell, phi, domain.cells)
     taken = coupling @ way.ravel()
-    at = np.flatnonzero(marked_corners(domain.face_cell, phi >= 0.0, domain.cells))
     if len(at):
         faces, found = (domain.polygons(), domain.face_corners), np.empty((len(at), 4))
         over(
@@ -40,7 +40,31 @@ def taken_from_nodes(domain, coupling, phi: Array, way: Array) -> Array:
             weight=POLYGON,
         )
         _take_off(at, domain.face_cell, domain.cells, found, taken)
-    return taken
+    return np.where(reached, taken, 0.0)
+
+
+@kernel
+def _above_water(face_cell, phi, cells):
+    """Polygons (k,) whose cells are not wholly wet and have a node of which water can be taken; reached (N,) bool:
+    these nodes, those of polygons whose cells have a wet node."""
+    wet, reached = np.zeros(face_cell.shape[0], np.uint8), np.zeros(phi.shape[0], np.bool_)
+    for s in range(face_cell.shape[0]):
+        e = np.uint64(face_cell[s])
+        for a in range(4):
+            wet[s] += phi[np.uint64(cells[e, a])] < 0.0
+        if wet[s] > 0:
+            for a in range(4):
+                reached[np.uint64(cells[e, a])] = True
+    found, n = np.empty(face_cell.shape[0], np.int64), 0
+    for s in range(face_cell.shape[0]):
+        e = np.uint64(face_cell[s])
+        some = False
+        for a in range(4):
+            some = some or reached[np.uint64(cells[e, a])]
+        if some and wet[s] < 4:
+            found[n] = s
+            n += 1
+    return found[:n].copy(), reached
 
 
 @released

@@ -38,6 +38,14 @@ def test_a_cube_takes_what_the_wet_part_of_its_faces_sweeps(covers):
         assert turned.sum() == pytest.approx(0.0, abs=1e-9 * d)
 
 
+def test_nothing_at_all_is_taken_above_the_cells_of_the_surface():
+    """Half of a turned cube is in the air, where what it pushes is air: not even round-off of water is left there."""
+    way = 1e-3 * np.array([1.0, -0.7, 0.4, 0.3, -0.2, 0.5])
+    found, nodes = taken(0.43, way, "single")
+    assert (found[nodes[:, 2] > LEVEL + SIZE[2] / CELLS[2]] == 0.0).all()
+    assert np.count_nonzero(found) > 20
+
+
 def test_a_cube_in_the_air_of_wet_cells_takes_nothing():
     """Its base is 1 mm above the water, in cells that hold some."""
     for way in np.eye(6):
