@@ -22,7 +22,7 @@ from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradient_rows
 from fluid.numerics.fields import marks_of
 from fluid.numerics.spans import spans
-from kernels.decorators import kernel, ranged, released
+from kernels.decorators import inner, kernel, ranged, released
 from kernels.threads import over, taken
 
 NO_WATER = 1e-9
@@ -398,25 +398,42 @@ def _nodes_around(first, last, cells, node_start, node_cells):
     start = np.zeros(n + 1, np.uint32)
     slot = np.full(node_start.shape[0] - 1, -1, np.int64)
     around, shared = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64, np.uint8)
-    count = 0
-    for i in range(first, last):
-        row_start = count
-        most = 3 * int(node_start[i + 1] - node_start[i])
-        if count + most > around.shape[0]:
-            around = np.concatenate((around, np.empty(around.shape[0] + most, np.uint32)))
-            shared = np.concatenate((shared, np.empty(shared.shape[0] + most, np.uint8)))
-        for t in range(node_start[i], node_start[i + 1]):
+    row, count = _next_around(0, first, n, cells, node_start, node_cells, slot, start, around, shared)
+    while row < n:  # not where rows are filled: numba would count references to both arrays in every turn
+        more = around.shape[0] + _most_around(first + row, node_start)
+        around = np.concatenate((around, np.empty(more, np.uint32)))
+        shared = np.concatenate((shared, np.empty(more, np.uint8)))
+        row, count = _next_around(row, first, n, cells, node_start, node_cells, slot, start, around, shared)
+    return start, around[:count].copy(), shared[:count].copy()
+
+
+@inner
+def _most_around(i, node_start):
+    """More neighbours than node i can have."""
+    return 3 * (np.int64(node_start[i + 1]) - np.int64(node_start[i]))
+
+
+@inner
+def _next_around(row, first, n, cells, node_start, node_cells, slot, start, around, shared):
+    """Fill rows of `_nodes_around`, from one on, for as long as there is room; → the next row, and how many neighbours
+    there are so far."""
+    count = np.int64(start[row])
+    for r in range(row, n):
+        i, begun = np.uint64(first + r), count
+        if count + _most_around(first + r, node_start) > around.shape[0]:
+            return r, count
+        for t in range(node_start[i], node_start[i + np.uint64(1)]):
             for a in range(4):
                 j = cells[node_cells[t], a]
                 if j == i:
                     continue
-                if slot[j] < row_start:
-                    slot[j] = count
-                    around[count], shared[count] = j, 0
+                if slot[j] < begun:
+                    slot[j], around[np.uint64(count)], shared[np.uint64(count)] = count, j, 1
                     count += 1
-                shared[slot[j]] += 1
-        start[i - first + 1] = count
-    return start, around[:count].copy(), shared[:count].copy()
+                else:
+                    shared[np.uint64(slot[j])] += 1
+        start[np.uint64(r + 1)] = count
+    return n, count
 
 
 @ranged
@@ -505,34 +522,42 @@ def _edges(first, last, rows, cells, parent, products, volume, node_start, node_
     n = last - first
     slot = np.full(node_start.shape[0] - 1, -1, np.int64)
     start = np.zeros(n + 1, np.uint32)
-    capacity = 16 * n + 64
-    neighbour = np.empty(capacity, np.uint32)
-    stiffness = np.empty(capacity)
-    count = 0
-    for r in range(n):
-        i = rows[first + r]
-        most = 3 * int(node_start[i + 1] - node_start[i])
-        if count + most > capacity:
-            capacity = 2 * capacity + most
-            neighbour = np.concatenate((neighbour[:count], np.empty(capacity - count, np.uint32)))
-            stiffness = np.concatenate((stiffness[:count], np.empty(capacity - count)))
-        for t in range(node_start[i], node_start[i + 1]):
+    neighbour, stiffness = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64)
+    mesh = (cells, parent, products, volume, node_start, node_cells)
+    row, count = _next_edges(0, rows[first:last], *mesh, slot, start, neighbour, stiffness)
+    while row < n:  # as in `_nodes_around`
+        more = neighbour.shape[0] + _most_around(rows[first + row], node_start)
+        neighbour = np.concatenate((neighbour, np.empty(more, np.uint32)))
+        stiffness = np.concatenate((stiffness, np.empty(more)))
+        row, count = _next_edges(row, rows[first:last], *mesh, slot, start, neighbour, stiffness)
+    return start, neighbour[:count].copy(), stiffness[:count].copy()
+
+
+@inner
+def _next_edges(
+    row, nodes, cells, parent, products, volume, node_start, node_cells, slot, start, neighbour, stiffness
+):
+    """Fill rows of `_edges`, from one on, for as long as there is room; → the next row, and how many edges there are so
+    far."""
+    count = np.int64(start[row])
+    for r in range(row, nodes.shape[0]):
+        i, begun = np.uint64(nodes[r]), count
+        if count + _most_around(nodes[r], node_start) > neighbour.shape[0]:
+            return r, count
+        for t in range(node_start[i], node_start[i + np.uint64(1)]):
             e = node_cells[t]
-            p = parent[e]
-            la = 0
-            while cells[e, la] != i:
-                la += 1
+            p, own = parent[e], np.uint64(0)
+            while cells[e, own] != i:
+                own += np.uint64(1)
             for b in range(4):
-                if b == la:
+                if np.uint64(b) == own:
                     continue
                 j = cells[e, b]
-                k = volume[e] * products[p, PAIR[la, b]]
-                if slot[j] < start[r]:
-                    slot[j] = count
-                    neighbour[count] = j
-                    stiffness[count] = k
+                k = volume[e] * products[p, PAIR[own, b]]
+                if slot[j] < begun:
+                    slot[j], neighbour[np.uint64(count)], stiffness[np.uint64(count)] = count, j, k
                     count += 1
                 else:
-                    stiffness[slot[j]] += k
-        start[r + 1] = count
-    return start, neighbour[:count].copy(), stiffness[:count].copy()
+                    stiffness[np.uint64(slot[j])] += k
+        start[np.uint64(r + 1)] = count
+    return nodes.shape[0], count
