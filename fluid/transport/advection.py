@@ -4,9 +4,17 @@ Foot of the path that ends at node x:           x_d = x - dt u_m(x_d),  u_m = u 
 Transported value:                              f1(x) = f(x_d)
 Half of the error of one interpolation, estimated on the way back, is subtracted (Selle, Fedkiw, Kim, Liu, Rossignac,
 J. Sci. Comput. 35 (2008) 350):                 f2(x) = f1(x) + [f(x) - f1(x + dt u_m)] / 2
-f2 is rejected where it leaves the range of f in the cell of the foot, and on open sides: the path forward from there
-ends at the side, so that the way back does not return f1, and only half of the change would be applied (the water of a
-draining pool left with a quarter more energy than it had).
+The correction c = f2 - f1 may lead to the end of the range of f in the cell of the foot; what it would leave the range
+by, x, is taken back from it:                   f(x) = f1(x) + sign(c) max(|c| - TAKEN_BACK x, 0)
+A corner of the cell with the weight λ belongs to the range up to
+                                                f1 + min(λ / COUNTED_IN_FULL, 1) (f_corner - f1)
+so that the range does not jump as a foot passes from cell to cell. The result depends continuously on f and on the
+paths; if corrections were rejected as a whole, a difference in the last digit became one of the velocity. It lies
+within the values at the corners of the cell. In smooth flow it is f2: near a node both c and the range shrink with the
+distance of the foot from it.
+
+On open sides c = 0. The path forward from there ends at the side, so that the way back does not return f1, and only
+half of the change would be applied (the water of a draining pool left with a quarter more energy than it had).
 
 Paths are followed from cell to cell through open faces, starting in a cell of the node. This works on any mesh and
 never leads through a wall, however thin, because cells at a wall have no neighbour on its other side."""
@@ -25,8 +33,14 @@ from kernels.threads import over
 _LONGEST_WALK = 100
 SWEEPS = 3
 """Sweeps of the fixed point."""
-OUTSIDE, COUNTED = -1e-9, 1e-9
-"""Barycentric coordinates below which a point lies beyond a face, and above which a corner has a weight."""
+OUTSIDE = -1e-9
+"""Barycentric coordinate below which a point lies beyond a face."""
+COUNTED_IN_FULL = 0.25
+"""Weight of a corner from which on its value belongs to the range upstream in full: all four do in the middle of a
+cell. The smaller it is, the more steeply the range changes near faces."""
+TAKEN_BACK = 2.0
+"""Multiple of what would leave the range by which a correction is reduced. With 2 a correction twice as large as the
+range allows is left out, as untrustworthy, and a difference of corrections never grows."""
 
 
 @inlined
@@ -129,18 +143,17 @@ def _brought(first, last, listed, dt, u_m, f, mesh, origin, f1):
 
 @inner
 def _bring(first, last, listed, dt, u_m, f, mesh, scratch, origin, f1):
-    """f1 (N, 4) at the listed nodes, and the origin of each: cell of its foot and a bit for each corner of it with a
-    weight, both (n,); scratch (2, 4): work space."""
+    """f1 (N, 4) at the listed nodes, and the origin of each: cell of its foot (n,) and weights of its corners (n, 4);
+    scratch (2, 4): work space."""
     x, lam = scratch[0], scratch[1]
-    cells, (cell, corners) = mesh.cells, origin
+    cells, (cell, weight) = mesh.cells, origin
     for s in range(first, last):
         i = np.uint64(listed[s])
         e = _foot(i, -dt, SWEEPS, u_m, mesh, x, lam)
         f1[i, 0], f1[i, 1], f1[i, 2], f1[i, 3] = _interpolated(e, lam, cells, f)
-        cell[s], corners[s] = e, 0
+        cell[s] = e
         for a in range(4):
-            if lam[a] > COUNTED:
-                corners[s] |= 1 << a
+            weight[s, a] = lam[a]
 
 
 @inlined
@@ -163,12 +176,10 @@ def _limited(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, ou
 
 @inner
 def _limit(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, scratch, out):
-    """Set out (n, 4) to f2 where this stays within the range of f over the cell of the foot, and to f1 elsewhere and on
-    open sides. origin: as in `_bring` · scratch (3, 4): work space.
-
-    Only corners with a weight count: a foot on a face must not depend on the side it was found from."""
+    """Set out (n, 4) to f1 with its limited correction, and to f1 alone on open sides. origin: as in `_bring` ·
+    scratch (3, 4): work space."""
     x, lam, ahead = scratch[0], scratch[1], scratch[2]
-    cells, (cell, corners) = mesh.cells, origin
+    cells, (cell, weight) = mesh.cells, origin
     for s in range(first, last):
         i = np.uint64(listed[s])
         if on_open_side[i]:
@@ -179,12 +190,15 @@ def _limit(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, scra
         ahead[0], ahead[1], ahead[2], ahead[3] = _interpolated(e, lam, cells, f1)
         e = np.uint64(cell[s])
         for k in range(4):
-            low, high = np.inf, -np.inf
+            own = f1[i, k]
+            low, high = own, own
             for a in range(4):
-                if corners[s] & (1 << a):
-                    low, high = min(low, f[cells[e, a], k]), max(high, f[cells[e, a], k])
-            f2 = f1[i, k] + 0.5 * (f[i, k] - ahead[k])
-            out[s, k] = f2 if low <= f2 <= high else f1[i, k]
+                reach = own + min(weight[s, a] / COUNTED_IN_FULL, 1.0) * (f[cells[e, a], k] - own)
+                low, high = min(low, reach), max(high, reach)
+            change = 0.5 * (f[i, k] - ahead[k])
+            beyond = max(own + change - high, low - own - change, 0.0)
+            left = max(abs(change) - TAKEN_BACK * beyond, 0.0)
+            out[s, k] = own + np.copysign(left, change)
 
 
 class Fields(NamedTuple):
@@ -216,7 +230,7 @@ def transport(topology, listed, dt: float, u_m, u, phi, on_open_side):
 def carried(topology, listed, dt: float, u_m, fields: Fields, on_open_side):
     """`transport` of fields, of which it sets `brought` at the listed nodes."""
     n, (f, f1) = len(listed), fields
-    out, origin = np.empty((n, 4)), (np.empty(n, np.uint32), np.empty(n, np.uint8))
+    out, origin = np.empty((n, 4)), (np.empty(n, np.uint32), np.empty((n, 4)))
     over(_brought, n, listed, dt, u_m, f, topology.paths, origin, f1)
     over(_limited, n, listed, dt, u_m, on_open_side, f, topology.paths, origin, f1, out)
     return out

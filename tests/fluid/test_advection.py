@@ -1,4 +1,4 @@
-"""Transport: exact for linear fields, paths stop at walls and never pass through a thin one."""
+"""Transport: exact for linear fields, limited without a jump, paths stop at walls and never pass through a thin one."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import Background, box_mesh
-from fluid.transport.advection import Fields, carried, feet, transport
+from fluid.transport.advection import COUNTED_IN_FULL, SWEEPS, TAKEN_BACK, Fields, carried, feet, transport
 
 
 @pytest.fixture(scope="module", params=["lattice", "jittered"])
@@ -69,6 +69,50 @@ def _rotation_error(n):
         f = transport(t, np.arange(len(x)), dt, way, u, f, np.zeros(len(f), bool))[:, 3].copy()
     exact = np.exp(-25 * (x[:, 0] ** 2 + (x[:, 1] - 0.2) ** 2))
     return np.abs(f - exact).mean()
+
+
+def noise(cube):
+    """Values (N, 4) between 0 and 1, which limit most corrections."""
+    return np.random.default_rng(4).uniform(size=(len(cube.nodes), 4))
+
+
+def test_limited_correction_equals_its_formula_and_stays_within_the_cell_of_the_foot(cube):
+    f = noise(cube)
+    swirl = np.random.default_rng(5).normal(size=(len(f), 3))
+    every, nowhere, dt = np.arange(len(f)), np.zeros(len(f), bool), 0.04
+    moved = transport(cube, every, dt, swirl, f[:, :3], f[:, 3], nowhere)
+    (cell, weight), (ahead, share) = (
+        feet(every, s, dt, n, swirl, cube.paths) for s, n in ((-1, SWEEPS), (1, 0))
+    )
+    corners, counted = f[cube.cells[cell]], np.minimum(weight / COUNTED_IN_FULL, 1.0)[:, :, None]
+    f1 = np.einsum("na,nak->nk", weight, corners)
+    change = 0.5 * (f - np.einsum("na,nak->nk", share, f1[cube.cells[ahead]]))
+    reach = f1[:, None] + counted * (corners - f1[:, None])
+    beyond = np.maximum(f1 + change - reach.max(axis=1), reach.min(axis=1) - f1 - change).clip(0.0)
+    expected = f1 + np.sign(change) * np.maximum(np.abs(change) - TAKEN_BACK * beyond, 0.0)
+    assert (beyond > 0.0).mean() > 0.1
+    np.testing.assert_allclose(moved, expected, atol=1e-13)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    assert np.all((moved >= low - 1e-13) & (moved <= high + 1e-13))
+
+
+def test_result_does_not_jump_as_paths_turn(cube):
+    """Feet that go a quarter round their nodes, through all cells on their way: a quarter of the angle a step leaves a
+    quarter of the largest change in a step. Where a correction was rejected as a whole, 0.2 remained, however short the
+    step, and a difference in the last digit became one of the result."""
+    coarse, fine = (_largest_change(cube, steps) for steps in (500, 2000))
+    assert fine < 0.05, fine
+    assert fine < 0.5 * coarse
+
+
+def _largest_change(cube, steps):
+    f, inner = noise(cube), np.all((cube.nodes > 0.3) & (cube.nodes < 0.7), axis=1)
+    nowhere, largest, last = np.zeros(len(f), bool), 0.0, None
+    for angle in np.linspace(0.0, 0.5 * np.pi, steps + 1):
+        u = np.tile([np.cos(angle), np.sin(angle), 0.3 * np.cos(3 * angle)], (len(f), 1))
+        now = transport(cube, np.arange(len(f)), 0.1, u, f[:, :3], f[:, 3], nowhere)[inner]
+        largest, last = max(largest, np.abs(now - last).max() if last is not None else 0.0), now
+    return largest
 
 
 def test_paths_do_not_cross_a_thin_wall():

@@ -31,8 +31,16 @@ def test_a_sheet_on_two_cells_pushes_with_what_arrives(aside):
 def test_the_correction_of_the_level_set_keeps_the_momentum_and_the_place_of_a_thin_sheet():
     """In the 6 D/U in which a jet of eight widths meets a plate, on two cells: the last shift, which brings the total
     volume back along all of the surface, moved 3 D² when the equation before it was solved once only, and 0.1 of the
-    momentum ρ U D² was lost."""
-    water, _, _ = _start(12.0, 2, 90.0, 1.0, "bounded", 0.0, 0.0, "wide")
+    momentum ρ U D² was lost. In four places of jet and plate between the nodes 0.03 is gained to 0.05 lost;
+    it is the mean that must be small."""
+    shifted, lost = np.transpose([_shifted_and_lost(aside) for aside in (0.0, 0.25, 0.5, 0.75)])
+    assert shifted.max() < 0.1
+    assert abs(lost.mean()) < 0.02
+
+
+def _shifted_and_lost(aside):
+    """What the last shift moved [D²] and the lost momentum [ρ U D²], the place in cells along the plate."""
+    water, _, _ = _start(12.0, 2, 90.0, 1.0, "bounded", 0.0, aside, "wide")
     shifted, lost, scale = 0.0, 0.0, 0.5  # the depth of the slice
     while water.time < 6.0:
         problem = water.predict(min(water.stable_step(), water.mesh.finest))
@@ -41,8 +49,7 @@ def test_the_correction_of_the_level_set_keeps_the_momentum_and_the_place_of_a_t
         lines = water.report.momentum.lines
         shifted += abs(water.report.reinserted) / scale
         lost -= (lines["transport"] + lines["volume_correction"])[0] / (DENSITY * scale)
-    assert shifted < 0.1
-    assert abs(lost) < 0.04
+    return shifted, lost
 
 
 @pytest.mark.parametrize(
