@@ -33,7 +33,7 @@ def test_long_wave_of_any_height_goes_out_as_if_the_water_went_on(height):
 
 
 def test_a_given_flow_that_differs_along_a_side_over_a_slope_is_left_as_it_is():
-    """The mean velocity of both flows is that of their discharge: deep water counts more, in the given flow as inside."""
+    """The mean velocity of both flows is that of their discharge: deep water counts more, as it does inside."""
 
     def velocity(points, time):
         return np.column_stack([0.2 + 0.5 * points[:, 1], np.zeros((len(points), 2))])
