@@ -14,7 +14,7 @@ STEPS = 8
 BEFORE = 0.35
 """Seconds of the dam break before the steps that are measured."""
 STAGES = {
-    "transport": (("step.predictor", "transport"),),
+    "transport": (("step.predictor", "carried"),),
     "distance": (("step.predictor", "redistance"),),
     "volume": (
         ("transport.surface_momentum", "carry_volume"),
