@@ -90,7 +90,9 @@ ALWAYS = {
     "P63": "Jets are 24 widths long, and the means are taken from 6 to 18 D/U: theory is that of an endless jet, and "
     "on one cell the plate receives in three steps what it lacked in the three before ([how long a jet has to "
     "be](theory.md#fast-water)). What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth "
-    "runs back along the plate, a quarter of a cell with four cells over the jet.",
+    "runs back along the plate, a quarter of a cell with four cells over the jet. On two cells the force depends on "
+    "where the plate lies between the nodes: at 60 degrees, in eight places, it is 0.978 ± 0.018 (mean and standard "
+    "deviation).",
     "P61": "Cells at the shore are 8 cm wide. With the island moved by 0, 1, −1 and 10 mm along the wave an earlier "
     "version had 0.080, 0.078, 0.091 and 0.080 m facing the wave and 0.078, 0.090, 0.083 and 0.079 m in the lee, and "
     "another one 0.093 and 0.094 m. A part of that was a fault: once in a while the shift of the surface was solved "
