@@ -114,14 +114,15 @@ def _impact_findings(where: str, run: Impact, table, told: str = ""):
     low, high = (np.interp(at, table["tstar"], table[k]) for k in ("p2p5", "p97p5"))
     arrival = run.t[np.argmax(run.p[:, 1] > 0.1)]
     measured = table["tstar"][np.argmax((table["median"] > 0.1) & (table["tstar"] > 1.0))]
-    yield Finding(f"{where}arrival t* (p* = 0.1){told}", arrival, measured, 0.15, False)
+    yield Finding(f"{where}arrival t* (p* = 0.1){told}", arrival, measured, ANY if told else 0.15, False)
     # the band of the repeated runs is not symmetric about the median, so its middle is the reference
     ends = np.trapezoid(low, at), np.trapezoid(high, at)
     impulse, middle, half = np.trapezoid(found, at), 0.5 * sum(ends), 0.5 * (ends[1] - ends[0])
-    yield Finding(f"{where}impulse {FROM} < t* < {TO:g}{told}", impulse, middle, half, False)
+    yield Finding(f"{where}impulse {FROM} < t* < {TO:g}{told}", impulse, middle, ANY if told else half, False)
     late = at > 3.0
     inside = np.mean((found >= low)[late] & (found <= high)[late])
-    yield Finding(f"{where}share of 3 < t* < 6 within the 2.5-97.5 % band{told}", inside, 1.0, 0.2, False)
+    what = f"{where}share of 3 < t* < 6 within the 2.5-97.5 % band{told}"
+    yield Finding(what, inside, 1.0, ANY if told else 0.2, False)
 
 
 def _impact(n: int, width: int = 2, until: float = 6.6, **settings) -> Impact:
