@@ -220,15 +220,11 @@ class Fields(NamedTuple):
         over(_renewed, len(listed), listed, *self)
 
 
-def transport(topology, listed, dt: float, u_m, u, phi, on_open_side):
-    """u (N, 3) [m/s] and φ (N,) [m] after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, 4).
+def carried(topology, listed, dt: float, u_m, fields: Fields, on_open_side):
+    """u [m/s] and φ [m] after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, 4); sets
+    `fields.brought` at these nodes.
 
     on_open_side (N,) bool: nodes where water may leave."""
-    return carried(topology, listed, dt, u_m, Fields.of(u, phi), on_open_side)
-
-
-def carried(topology, listed, dt: float, u_m, fields: Fields, on_open_side):
-    """`transport` of fields, of which it sets `brought` at the listed nodes."""
     n, (f, f1) = len(listed), fields
     out, origin = np.empty((n, 4)), (np.empty(n, np.uint32), np.empty((n, 4)))
     over(_brought, n, listed, dt, u_m, f, topology.paths, origin, f1)

@@ -10,6 +10,7 @@ from fluid.mesh.background import box_mesh
 from fluid.numerics.bounded import solve_pressure
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
+from fluid.transport.advection import Fields, carried
 
 
 def tank(size, cell, fill, bodies=None, is_open=None, covers="single", split="kuhn", **parameters) -> Water:
@@ -45,3 +46,8 @@ def rotation(axis, angle):
 def column(width, height):
     """Fill: a column of water against the wall x = 0 across the tank."""
     return lambda x: np.maximum(x[:, 0] - width, x[:, 2] - height)
+
+
+def transport(topology, listed, dt, u_m, u, phi, on_open_side):
+    """u (N, 3) and φ (N,) after dt at the listed nodes (n,), carried by u_m (N, 3) → (n, 4)."""
+    return carried(topology, listed, dt, u_m, Fields.of(u, phi), on_open_side)

@@ -7,7 +7,8 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import Background, box_mesh
-from fluid.transport.advection import COUNTED_IN_FULL, SWEEPS, TAKEN_BACK, Fields, carried, feet, transport
+from fluid.transport.advection import COUNTED_IN_FULL, SWEEPS, TAKEN_BACK, Fields, carried, feet
+from tests.fluid.scenes import transport
 
 
 @pytest.fixture(scope="module", params=["lattice", "jittered"])

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.point_location import Outside
+from fluid.pressure.projection import with_ghosts
 from fluid.readings import gauges
+from fluid.readings.at_surface import Around, Found, _read
 from fluid.readings.clip import clipped, volumes
 from tests.fluid.scenes import advance, column, load, rotation, tank
 
@@ -63,6 +65,24 @@ def test_pressure_at_the_water_line_on_a_block(angle, depth, covers):
     free = np.isfinite(found)
     assert free.sum() > 300
     np.testing.assert_allclose(found[free], 9810 * (depth - places[free, 2]), atol=1e-4)
+
+
+def test_pressure_goes_on_to_dry_nodes_as_for_the_gradient():
+    """Both make it from the pressures of the cells around a dry node, in different loops."""
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.437 - 0.05 * x[:, 0])
+    wet, random = water.level_set < 0.0, np.random.default_rng(2)
+    water.pressure[:] = np.where(wet, 1e4 * (1.0 + random.random(len(wet))), 0.0)
+    t, phi, air = water.topology, water.level_set, np.zeros(len(wet))
+    cut = np.flatnonzero(wet[t.cells].any(axis=1)).astype(np.uint32)
+    ghosts = with_ghosts(water.pressure, air, wet, water.walls.open_node, phi, cut, t.cells, t.volume)
+    dry = np.flatnonzero(~wet & np.isin(np.arange(len(wet)), t.cells[cut]))
+    around = Around(t.node_start, t.node_cells, t.cells, t.volume)
+    found = Found(water.pressure, air, phi, np.zeros(len(wet), bool), water.walls.open_node)
+    corners = np.stack([dry, *3 * [np.full(len(dry), np.flatnonzero(wet)[0])]], axis=1)
+    deep = water.pressure[corners[:, 1]]
+    read = _read(corners, np.tile([-1.0, 1.0, 0.0, 0.0], (len(dry), 1)), found, around)
+    np.testing.assert_allclose(deep - read, ghosts[dry], rtol=1e-12, atol=1e-9)
+    assert len(dry) > 50
 
 
 def test_no_pressure_below_that_of_the_air_beside_it():

@@ -9,7 +9,8 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.covers import components
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
-from fluid.transport.advection import feet, transport
+from fluid.transport.advection import feet
+from tests.fluid.scenes import transport
 from tests.fluid.test_thin_walls import BOX, MESH, H, bricks, plate, side_growth
 
 
