@@ -15,13 +15,12 @@ from coupler.verdict.attitude import tilt_of
 from coupler.verdict.damage import Rules, state_of
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import _largest, places_of, verdict
-from coupler.verdict.watch import Peaks, Watch
-from coupler.verdict.words import _loads, _of_bodies, sentences, still_rising, unreached, unsettled
+from coupler.verdict.watch import Peaks
+from coupler.verdict.words import _loads, _of_bodies, sentences, unreached
 from tests.coupler.resumed import DRY, begin
 from tests.coupler.test_docs import FIGURES
+from tests.coupler.verdict_scene import record, verdict_scene
 from yade_scripts.blocks.block import Block
-
-G = 9.81
 
 
 def test_the_name_of_a_block_says_wall_and_storey():
@@ -61,82 +60,9 @@ def test_names_of_tables_are_no_walls_blocks_or_storeys():
     ]  # fmt: skip
 
 
-class FakeJoints:
-    """Two joints: block 0 with the ground, block 1 with block 0; x is out of the wall."""
-
-    a, b = np.array([0, 1]), np.array([-1, 0])
-
-    def __len__(self):
-        return 2
-
-
-class FakeStructure:
-    """A wall of two blocks of 1 m, 0.4 m thick along x, one on the other, and a loose crate in front of it."""
-
-    def __init__(self):
-        wall = {"size": np.array([0.4, 1.0, 1.0]), "density": 1000.0}
-        self.blocks = [
-            Block("wall-0", np.array([5.0, 0, 0.5]), **wall),
-            Block("wall-1", np.array([5.0, 0, 1.5]), **wall),
-            Block("crate", np.array([3.0, 0, 0.5]), size=np.ones(3), density=500.0, group="crate"),
-        ]
-        self.names = [b.name for b in self.blocks]
-        self.n, self.fixed = 3, np.zeros(3, bool)
-        self.mass = np.array([b.mass for b in self.blocks])
-        self.gravity = np.array([0.0, 0.0, -G])
-        self.joints = FakeJoints()
-        self.x = np.array([b.centre for b in self.blocks])
-        self.turn = np.array([np.eye(3)] * 3)
-        self.v = np.zeros((3, 6))
-        self.broke, self.torn = np.full(2, np.nan), np.zeros(2)
-
-    def centre(self):
-        return self.x
-
-    def rotation(self):
-        return self.turn
-
-    def velocity(self):
-        return self.v.copy()
-
-    def joint_table(self):
-        return SimpleNamespace(
-            a=FakeJoints.a,
-            b=FakeJoints.b,
-            area=np.array([0.4, 0.4]),
-            alive=np.isnan(self.broke),
-            failure_time=self.broke,
-            torn=np.where(np.isnan(self.broke), self.torn, 1.0),
-        )
-
-    def joint_polygons(self, at_start=False):
-        square = np.array([[4.8, -0.5, 0.0], [5.2, -0.5, 0.0], [5.2, 0.5, 0.0], [4.8, 0.5, 0.0]])
-        return np.concatenate([square, square + np.array([0, 0, 1.0])]), np.array([0, 4, 8])
-
-
 @pytest.fixture
 def scene():
-    s = FakeStructure()
-    parts = [
-        SimpleNamespace(path=("structure", "wall", 0), name="wall", blocks=tuple(s.blocks[:2])),
-        SimpleNamespace(path=("structure", "block", 0), name="crate", blocks=tuple(s.blocks[2:])),
-    ]
-    watch = Watch(
-        s, Divisions.of(parts, 3), Rules(moved=0.1, collapsed_weight=0.5), np.array([True, True, False])
-    )
-    water = SimpleNamespace(domain=SimpleNamespace(body_centre=s.x))
-    return s, watch, SimpleNamespace(structure=s, water=water)
-
-
-def record(time, contact=None, load=None):
-    """A step of 10 ms that ends at time, with impulses of contacts (3, 3) [N s] and forces of the water (3, 3) [N]."""
-    impulses = SimpleNamespace(contact=np.zeros((3, 9)))
-    if contact is not None:
-        impulses.contact[:, :3] = contact
-    forces = np.zeros((3, 6))
-    if load is not None:
-        forces[:, :3] = load
-    return SimpleNamespace(time=time, dt=0.01, impulses=impulses, load=forces)
+    return verdict_scene()
 
 
 def test_nothing_happened(scene):
@@ -226,87 +152,6 @@ def test_displaced_blocks_are_listed_from_the_farthest_on(scene):
     watch.step(coupling, record(0.4))
     reported = verdict(s, watch)["displaced"]["list"]
     assert [found["block"] for found in reported] == ["wall-1", "wall-0"]
-
-
-def test_a_block_on_its_way_out_as_the_run_ends_is_doubted(scene):
-    """30 mm of the 40 from which it has left its place, at 50 mm/s: after 0.2 s more it has. Blocks that vibrate or
-    come back are no doubt, nor is a run of 0.1 s, which says nothing about so long."""
-    s, watch, coupling = scene
-    s.x = s.x + np.array([[0, 0, 0], [0.03, 0, 0], [0, 0, 0]])
-    for speed, length, doubted in (
-        (0.05, 1.0, True),
-        (-0.05, 1.0, False),
-        (0.0, 1.0, False),
-        (0.05, 0.1, False),
-    ):
-        s.v[1, 0] = speed
-        watch.step(coupling, record(length))
-        reported = verdict(s, watch)
-        assert reported["state"] == "stands"
-        assert bool(unsettled(reported, length)) is doubted
-        if doubted:
-            assert "'wall-1' still moves as the run ends at t = 1 s: it is 30 mm from its place" in unsettled(
-                reported, length
-            )
-            assert reported["leaving"]["within"] == pytest.approx(0.2)
-    s.v[1, 0] = 0.05
-    s.x[1, 0] -= 0.001  # it swings, and was farther out before
-    assert verdict(s, watch)["leaving"] is None
-
-
-@pytest.mark.parametrize(
-    ("load", "grows"),
-    [
-        (lambda t: 100.0, False),
-        (lambda t: 100.0 * t, True),
-        (lambda t: 1000.0 * max(t - 3.9, 0.0), True),
-        (lambda t: 100.0 * min(t, 2.0), False),
-        (lambda t: 500.0 if 1.0 < t < 1.5 else 10.0 * t * t, False),
-        (lambda t: 100.0 * (1.0 + 0.3 * np.sin(400.0 * t)), False),
-    ],
-    ids=(
-        "still water",
-        "rising",
-        "the front just arrives",
-        "a flood that stands",
-        "after an impact",
-        "trembling",
-    ),
-)
-def test_a_load_that_still_grows_as_the_run_ends_is_doubted(scene, load, grows):
-    """The peak may come later: a wall that the front had just reached stood without a word."""
-    s, watch, coupling = scene
-    for k in range(400):
-        t = 0.01 * (k + 1)
-        watch.step(coupling, record(t, load=[(load(t), 0, 0), (0, 0, 0), (0, 0, 0)]))
-    found = verdict(s, watch)
-    doubt = still_rising(found, 4.0)
-    assert (doubt is not None) == grows
-    if grows:
-        assert "horizontal force of the water still grows as the run ends at t = 4 s" in doubt
-        s.x = s.x + np.array([1.0, 0, 0])
-        watch.step(coupling, record(4.01))
-        assert still_rising(verdict(s, watch), 4.01) is None  # what has collapsed stays so
-
-
-def test_uplift_that_still_grows_is_doubted_too(scene):
-    s, watch, coupling = scene
-    for k in range(400):
-        watch.step(coupling, record(0.01 * (k + 1), load=[(10.0, 0, 100.0 * k), (0, 0, 0), (0, 0, 0)]))
-    assert "the force of the water still grows" in still_rising(verdict(s, watch), 4.0)
-
-
-def test_loose_blocks_beside_a_structure_with_joints_are_named(scene):
-    """A quay wall of loose blocks below a house: the verdict is about the house, and said nothing of the wall."""
-    s, watch, coupling = scene
-    watch.step(coupling, record(0.1))
-    last = "; verdict.on names what is judged, by default what has joints"
-    assert f"not judged: crate (in place){last}" in list(sentences(verdict(s, watch)))
-    s.x = s.x + np.array([[0, 0, 0], [0, 0, 0], [1.0, 0, 0]])
-    watch.step(coupling, record(0.2))
-    found = verdict(s, watch)
-    assert found["state"] == "stands"
-    assert f"not judged: crate (moved){last}" in list(sentences(found))
 
 
 def test_a_block_that_comes_back_has_left_its_place_and_is_no_collapse(scene):
@@ -427,121 +272,11 @@ def test_pressure_counts_only_while_a_block_is_in_its_place(scene):
     assert watch.pressure.value[1] == 0.0
 
 
-def crate_hits(scene, contact):
-    """The crate arrives at the wall with 3 m/s and stays there, given the impulses of contacts."""
-    s, watch, coupling = scene
-    s.v[2, 0] = 3.0
-    s.x[2, 0] = 4.2
-    watch.step(coupling, record(0.2))
-    s.v = np.zeros((3, 6))
-    watch.step(coupling, record(0.21, contact=contact))
-    return verdict(s, watch)["hits"]
-
-
-def test_debris_that_loses_its_speed_to_a_wall_has_hit_it(scene):
-    J = 500.0 * 3.0
-    (hit,) = crate_hits(scene, [[J, 0, 0], [0, 0, 0], [-J, 0, 0]])["list"]
-    assert (hit["block"], hit["other"], hit["time"]) == ("crate", "wall-0", 0.21)
-    assert (hit["speed"], hit["impulse"], hit["force"]) == pytest.approx((3.0, J, J / 0.01))
-
-
-@pytest.mark.parametrize("shares", [(0.5, 0.5), (0.3, 0.7), (1.0, 0.0)])
-def test_a_blow_that_the_end_of_a_step_divides_is_the_same_hit(scene, shares):
-    """The crate is stopped from 0.55 m/s, more than the 0.44 of a fall from a hundredth of its height, wherever
-    a step ends within the blow."""
-    s, watch, coupling = scene
-    s.x[2, 0], s.v[2, 0] = 4.2, 0.55
-    watch.step(coupling, record(0.2))
-    for time, share in zip((0.21, 0.22), shares):
-        J = 500.0 * 0.55 * share
-        s.v = s.v.copy()
-        s.v[2, 0] -= 0.55 * share
-        watch.step(coupling, record(time, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
-    (hit,) = verdict(s, watch)["hits"]["list"]
-    assert (hit["block"], hit["other"]) == ("crate", "wall-0")
-    assert (hit["speed"], hit["impulse"]) == pytest.approx((0.55, 500.0 * 0.55))
-
-
-def test_a_slow_stop_over_many_steps_is_no_hit(scene):
-    s, watch, coupling = scene
-    s.x[2, 0], s.v[2, 0] = 4.2, 1.7
-    J = 500.0 * 0.17
-    for k in range(10):
-        s.v = s.v.copy()
-        s.v[2, 0] -= 0.17
-        watch.step(coupling, record(0.2 + 0.01 * k, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
-    assert verdict(s, watch)["hits"]["pairs"] == 0
-
-
-def test_a_blow_goes_on_after_a_restart(scene):
-    s, watch, coupling = scene
-    s.x[2, 0], s.v[2, 0] = 4.2, 1.7
-    watch.step(coupling, record(0.2))
-    J = 500.0 * 0.85
-    saved = None
-    for time in (0.21, 0.22):
-        if saved is not None:
-            watch.restore(saved)
-        s.v = s.v.copy()
-        s.v[2, 0] -= 0.85
-        watch.step(coupling, record(time, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
-        saved = watch.save()
-        watch._blow = None
-    assert verdict(s, watch)["hits"]["pairs"] == 1
-
-
-def test_what_the_water_stops_has_hit_nothing(scene):
-    """It lost the speed, but no contact took it: only its own weight on the ground."""
-    W = 500.0 * G * 0.01
-    assert crate_hits(scene, [[0, 0, 0], [0, 0, 0], [0, 0, W]])["pairs"] == 0
-
-
-def test_debris_that_something_else_stops_has_not_hit_what_it_grazes(scene):
-    """The ground took its speed; the wall beside it felt a hundredth of that."""
-    J = 500.0 * 3.0
-    assert crate_hits(scene, [[0.01 * J, 0, 0], [0, 0, 0], [-J, 0, 0]])["pairs"] == 0
-
-
-def test_rubble_of_a_wall_can_be_hit_by_another_body(scene):
-    s, J = scene[0], 500.0 * 3.0
-    s.x[0, 0] += 0.3  # out of its place
-    (hit,) = crate_hits(scene, [[J, 0, 0], [0, 0, 0], [-J, 0, 0]])["list"]
-    assert (hit["block"], hit["other"]) == ("crate", "wall-0")
-
-
-def test_rubble_of_a_wall_that_tumbles_over_itself_hits_nothing(scene):
-    s, watch, coupling = scene
-    s.x[:2, 0] += 0.3
-    s.v[1, 2] = -3.0
-    watch.step(coupling, record(0.2))
-    s.v = np.zeros((3, 6))
-    J = s.mass[1] * 3.0
-    watch.step(coupling, record(0.21, contact=[[0, 0, -J], [0, 0, J], [0, 0, 0]]))
-    assert verdict(s, watch)["hits"]["pairs"] == 0
-
-
 def test_a_run_reports_the_judged_body_with_the_largest_force(scene):
     _, watch, coupling = scene
     push = np.array([[30.0, 0, 0], [0, 40.0, 0], [900.0, 0, 0]])  # the crate is not judged
     watch.step(coupling, record(0.1, load=push))
     assert watch.strongest() == ("wall", pytest.approx(50.0))
-
-
-def test_a_press_without_a_change_of_speed_is_no_hit(scene):
-    s, watch, coupling = scene
-    s.x[2, 0] = 4.2
-    J = 500.0 * 3.0
-    watch.step(coupling, record(0.2, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
-    assert verdict(s, watch)["hits"]["pairs"] == 0
-
-
-def test_a_run_that_goes_on_tells_the_same(scene):
-    s, watch, _ = scene
-    crate_hits(scene, [[1500.0, 0, 0], [0, 0, 0], [-1500.0, 0, 0]])
-    other = Watch(s, watch.divisions, watch.rules, watch.judged)
-    other.restore(watch.save())
-    assert verdict(s, other) == verdict(s, watch)
-    assert other.hits.tolist() == watch.hits.tolist()
 
 
 def test_the_order_of_failure_goes_by_the_first_break(scene):
