@@ -38,6 +38,14 @@ PLACES = (0.0, 0.25, 0.5, 0.75, 0.9)
 LIMITS = {8: 0.05, 4: 0.10, 2: 0.15, 1: 0.20}
 """Relative error of the force allowed, by cells over D."""
 SHEET_LIMITS = {8: 0.05, 4: 0.05, 2: 0.05, 1: 0.10}
+BEYOND = 0.3
+"""How far beyond a node the front of a plate lies, in cells there."""
+SHEET_PLACES = {
+    2: [{"aside": k / 8} for k in range(8)],
+    1: [{"beyond": (BEYOND + k / 8) % 1.0} for k in range(8)],
+}
+"""Places between the nodes over which forces of sheets are averaged, by cells over D. A jet of one cell has its volume
+only around a layer of nodes: there the plate alone is moved, along the jet, elsewhere plate and jet along the plate."""
 ANY = 10.0
 """Tolerance of values that are reported, not judged."""
 
@@ -61,10 +69,15 @@ def finite_plates():
             run = runs[n, width] = jet(width, n)
             exact = float(table["F"][row])
             yield Finding(f"force/(ρU²D), L/D = {width:g}, {n} cells over D", run.force, exact, limit)
+    halved = {}
     for row, width in enumerate(table["L_over_D"][:3]):
-        found, exact = jet(width, 4, finer=1.0).force, float(table["F"][row])
+        halved[width], exact = jet(width, 4, finer=1.0).force, float(table["F"][row])
         what = f"force/(ρU²D), L/D = {width:g}, 4 cells over D, 8 up to D around the plate"
-        yield Finding(what, found, exact, LIMITS[8])
+        yield Finding(what, halved[width], exact, LIMITS[8])
+    for row, width in enumerate(table["L_over_D"][:3]):
+        moved = [jet(width, 4, finer=1.0, aside=aside).force for aside in (0.25, 0.5, 0.75)]
+        what = f"the same, edges 0, 1/2, 1 and 3/2 of a small cell from a node: mean force, L/D = {width:g} {TOLD}"
+        yield Finding(what, float(np.mean([halved[width], *moved])), float(table["F"][row]), ANY)
     for row, width in enumerate(table["L_over_D"][:3]):
         for at, column in ((0.75, "p_075"), (0.9, "p_09")):
             found, exact = float(runs[8, width].pressure[PLACES.index(at)]), float(table[column][row])
@@ -95,12 +108,25 @@ def finite_plates():
 
 @check("P63", "sheet of water on an endless plate, straight and inclined", "momentum, exact", "M")
 def endless_plates():
+    runs = {}
     for angle in (90.0, 60.0, 30.0):
         for n, limit in SHEET_LIMITS.items():
             what = f"normal force/(ρU²D sin a), a = {angle:g}°, {n} cells over D"
-            yield Finding(
-                what, jet(12.0, n, angle=angle, long=True).force / np.sin(np.radians(angle)), 1.0, limit
-            )
+            runs[angle, n] = _sheet(n, angle)
+            yield Finding(what, runs[angle, n], 1.0, limit)
+    for (angle, n), first in runs.items():
+        if n not in SHEET_PLACES:
+            continue
+        force = np.array([first] + [_sheet(n, angle, **place) for place in SHEET_PLACES[n][1:]])
+        where = f"a = {angle:g}°, {n} cells over D {TOLD}"
+        yield Finding(f"mean over eight places between the nodes, {where}", float(force.mean()), 1.0, ANY)
+        yield Finding(f"standard deviation over them, {where}", float(force.std()), 0.0, ANY, False)
+        yield Finding(f"farthest off of them, {where}", float(force[np.abs(force - 1.0).argmax()]), 1.0, ANY)
+
+
+def _sheet(n: int, angle: float, **place) -> float:
+    """Normal force over ρ U² D sin a on an endless plate; place: `aside` or `beyond` of `jet`."""
+    return jet(12.0, n, angle=angle, long=True, **place).force / float(np.sin(np.radians(angle)))
 
 
 def jet(
@@ -113,16 +139,17 @@ def jet(
     aside: float = 0.0,
     openings: str = "",
     long: bool = False,
+    beyond: float = BEYOND,
 ) -> Jet:
     """A slug of water against a plate of the given width [D], n cells over D, in a slice of one cell.
 
     angle [degrees] between jet and plate · courant: of the step · finer [D]: how far around the plate cells are
     halved · aside: how far plate and jet are moved along the plate, in cells · openings: as in a case; by default
     "wide" where the plate is thinner than two cells and "all" elsewhere, as docs/water.md advises · long: LONG_SLUG and
-    its window."""
+    its window · beyond: a node, how far the front of the plate lies, in cells there."""
     openings = openings or ("wide" if THICK * n < 2.0 else "all")
     slug, (begin, end) = (LONG_SLUG, LONG) if long else (SLUG, STEADY)
-    water, front, along = _start(width, n, angle, courant, suction, finer, aside, openings, slug)
+    water, front, along = _start(width, n, angle, courant, suction, finer, aside, openings, slug, beyond)
     normal = np.array([np.sin(np.radians(angle)), 0.0, -np.cos(np.radians(angle))])
     places = np.array([front + s * f * 0.5 * width * along for f in PLACES for s in (1.0, -1.0)])
     depth, total, forces, pressures, lowest = 1.0 / n, 0.0, 0.0, np.zeros(len(PLACES)), 0.0
@@ -151,12 +178,12 @@ def _start(
     aside: float,
     openings: str,
     slug: float = SLUG,
+    beyond: float = BEYOND,
 ):
     """The water, the middle (3,) of the front of the plate, and the direction (3,) along the plate."""
     cell, turn = 1.0 / n, np.radians(90.0 - angle)
     reach = np.array([0.5 * width * np.sin(turn), 0.5 * width * np.cos(turn)])
-    # the front of the plate lies 0.3 of a cell, of those there, beyond a node
-    front = np.array([0.3 * cell / (2.0 if finer else 1.0), 0.5 * cell, aside * cell])
+    front = np.array([beyond * cell / (2.0 if finer else 1.0), 0.5 * cell, aside * cell])
     margin = 2.5 if width < 8.0 else 1.0
     low = [-(slug + 1.5 + reach[0]), 0.0, -(reach[1] + margin)]
     high = [reach[0] + 3.0, cell, reach[1] + margin]

@@ -28,7 +28,9 @@ NOTES = {
     "not lie on nodes: 1.00 to 1.12 times the force on a plate of width D with eight cells over D, depending "
     "on its place, and 1.10 to 1.21 with four (before walls that the water has left had air); with `all` 0.95 "
     "to 1.01 and 0.93 to 1.03. With a quarter of the step the plate of width D receives 2 % more on eight "
-    "cells; the plate of width D/2 on four cells 11 %, from 0.94 to 1.05 of its force.",
+    "cells; the plate of width D/2 on four cells 11 %, from 0.94 to 1.05 of its force. Where cells are halved around "
+    "the plate, both of its edges see the same diagonals; the place that is judged is the worst of four, and their "
+    "mean is within 1.5 % ([the diagonals](theory.md#fast-water)).",
     "P41": "The bore into two cells of still water is 5.5 % too slow (4.6 % with the correction of the level set "
     "spread over five cells in calm water, too), the one into four cells 4.4 %.",
     "P53": "Each swing is smaller than the reference by 0.02 to 0.03 of the drop height. Half of the step changes the "
@@ -90,9 +92,9 @@ ALWAYS = {
     "P63": "Jets are 24 widths long, and the means are taken from 6 to 18 D/U: theory is that of an endless jet, and "
     "on one cell the plate receives in three steps what it lacked in the three before ([how long a jet has to "
     "be](theory.md#fast-water)). What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth "
-    "runs back along the plate, a quarter of a cell with four cells over the jet. On two cells the force depends on "
-    "where the plate lies between the nodes: at 60 degrees, in eight places, it is 0.978 ± 0.018 (mean and standard "
-    "deviation).",
+    "runs back along the plate, a quarter of a cell with four cells over the jet. On two cells and one the force "
+    "depends on where jet and plate lie between the nodes, and a single place says little: the reported rows have "
+    "mean, standard deviation and worst of eight. [Theory](theory.md#fast-water) says where the load is lost.",
     "P61": "Cells at the shore are 8 cm wide. With the island moved by 0, 1, −1 and 10 mm along the wave an earlier "
     "version had 0.080, 0.078, 0.091 and 0.080 m facing the wave and 0.078, 0.090, 0.083 and 0.079 m in the lee, and "
     "another one 0.093 and 0.094 m. A part of that was a fault: once in a while the shift of the surface was solved "
