@@ -12,65 +12,79 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Floats, Integers
-from kernels.decorators import inner, kernel, plain, released
+from kernels.decorators import inlined, inner, kernel, plain, released
 from kernels.threads import found_over, over, owning, owns_any, reach_of_cells
 
 
-@inner
-def corner_moments(phi, a, out):
-    """∫ N_k / |e| over the part of the cell on the side of corner a, the only one there. phi (4,), out (4,)."""
-    v = 1.0
-    for b in range(4):
-        if b != a:
-            v *= phi[a] / (phi[a] - phi[b])
-    out[a] = 0.25 * v
-    for b in range(4):
-        if b != a:
-            t = phi[a] / (phi[a] - phi[b])
-            out[b] = 0.25 * v * t
-            out[a] += 0.25 * v * (1.0 - t)
+@inlined
+def _corner(p, q, r, s):
+    """∫ N / |e| over the part of the cell on the side of the first corner, the only one there, of all four corners."""
+    t, u, v = p / (p - q), p / (p - r), p / (p - s)
+    quarter = 0.25 * (t * u * v)
+    own = quarter + quarter * (1.0 - t) + quarter * (1.0 - u) + quarter * (1.0 - v)
+    return own, quarter * t, quarter * u, quarter * v
 
 
-@inner
-def _prism_moments(phi, a, b, c, d, out):
-    """∫ N_k / |e| over the wet side when a, b are wet and c, d dry.
+@inlined
+def _prism(a, b, c, d):
+    """∫ N / |e| over the wet side when the first two corners are wet and the other two dry, of all four corners.
 
     The crossings ac, ad, bc, bd divide the prism into the tetrahedra a ac ad bd, a ac bc bd and a b bc bd."""
-    ac, ad = phi[a] / (phi[a] - phi[c]), phi[a] / (phi[a] - phi[d])
-    bc, bd = phi[b] / (phi[b] - phi[c]), phi[b] / (phi[b] - phi[d])
+    ac, ad, bc, bd = a / (a - c), a / (a - d), b / (b - c), b / (b - d)
     first, second, third = 0.25 * ac * ad * (1.0 - bd), 0.25 * ac * (1.0 - bc) * bd, 0.25 * bc * bd
-    out[a] = first * (3.0 - ac - ad) + second * (2.0 - ac) + third
-    out[b] = first * (1.0 - bd) + second * (2.0 - bc - bd) + third * (3.0 - bc - bd)
-    out[c] = first * ac + second * (ac + bc) + third * bc
-    out[d] = first * (ad + bd) + second * bd + third * bd
+    of_a = first * (3.0 - ac - ad) + second * (2.0 - ac) + third
+    of_b = first * (1.0 - bd) + second * (2.0 - bc - bd) + third * (3.0 - bc - bd)
+    return (
+        of_a,
+        of_b,
+        first * ac + second * (ac + bc) + third * bc,
+        first * (ad + bd) + second * bd + third * bd,
+    )
+
+
+@inner
+def moments_below(a, b, c, d):
+    """∫_{φ<0} N_k / |e| of the four corners of a cell with these values of φ, all in registers."""
+    wet = np.int64(a < 0.0) + np.int64(b < 0.0) + np.int64(c < 0.0) + np.int64(d < 0.0)
+    if wet == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    if wet == 4:
+        return 0.25, 0.25, 0.25, 0.25
+    if wet == 2:
+        if (a < 0.0) == (b < 0.0):
+            if a < 0.0:
+                return _prism(a, b, c, d)
+            x, y, z, w = _prism(c, d, a, b)
+            return z, w, x, y
+        if (a < 0.0) == (c < 0.0):
+            if a < 0.0:
+                x, y, z, w = _prism(a, c, b, d)
+                return x, z, y, w
+            x, y, z, w = _prism(b, d, a, c)
+            return z, x, w, y
+        if a < 0.0:
+            x, y, z, w = _prism(a, d, b, c)
+            return x, z, w, y
+        x, y, z, w = _prism(b, c, a, d)
+        return z, x, y, w
+    alone = wet == 1
+    if (a < 0.0) == alone:
+        x, y, z, w = _corner(a, b, c, d)
+    elif (b < 0.0) == alone:
+        y, x, z, w = _corner(b, a, c, d)
+    elif (c < 0.0) == alone:
+        z, x, y, w = _corner(c, a, b, d)
+    else:
+        w, x, y, z = _corner(d, a, b, c)
+    if alone:
+        return x, y, z, w
+    return 0.25 - x, 0.25 - y, 0.25 - z, 0.25 - w
 
 
 @plain
 def wet_moments(phi, out):
     """∫_{φ<0} N_k / |e| (4,) of a cell with corner values phi (4,)."""
-    n_wet = 0
-    for k in range(4):
-        if phi[k] < 0.0:
-            n_wet += 1
-    if n_wet == 0 or n_wet == 4:
-        for k in range(4):
-            out[k] = 0.0 if n_wet == 0 else 0.25
-    elif n_wet == 2:
-        a, b, c, d = -1, -1, -1, -1
-        for k in range(4):
-            if phi[k] < 0.0:
-                a, b = (k, b) if a < 0 else (a, k)
-            else:
-                c, d = (k, d) if c < 0 else (c, k)
-        _prism_moments(phi, a, b, c, d, out)
-    else:
-        single = 0
-        while (phi[single] < 0.0) != (n_wet == 1):
-            single += 1
-        corner_moments(phi, single, out)
-        if n_wet == 3:
-            for k in range(4):
-                out[k] = 0.25 - out[k]
+    out[0], out[1], out[2], out[3] = moments_below(phi[0], phi[1], phi[2], phi[3])
 
 
 class FluidParts(NamedTuple):
@@ -88,36 +102,35 @@ class FluidParts(NamedTuple):
 
 
 @inner
-def part_moments(e, phi, parts, total, local, out):
-    """total (4,) <- ∫_{φ<0} N_a dV [m³] over the fluid part of cell e; phi (4,) at its corners; other arguments: work
-    space.
+def part_moments(e, phi, parts, local, out):
+    """∫_{φ<0} N_a dV [m³] of the four corners over the fluid part of cell e; phi: the four values there · local, out
+    (4,): work space.
 
     Exact: a whole cell by its corners, a cut one by the tetrahedra that fill it."""
-    n_wet = 0
-    for a in range(4):
-        n_wet += phi[a] < 0.0
-        total[a] = 0.0
-    if n_wet == 0:
-        return
-    if n_wet == 4:
-        for a in range(4):
-            total[a] = parts.volume[e] * parts.share[parts.share_row[e], a]
-        return
-    if parts.start[e] == parts.start[e + 1]:
-        wet_moments(phi, out)
-        for a in range(4):
-            total[a] = parts.volume[e] * out[a]
-        return
-    for t in range(parts.start[e], parts.start[e + 1]):
+    a, b, c, d = phi
+    if not (a < 0.0 or b < 0.0 or c < 0.0 or d < 0.0):
+        return 0.0, 0.0, 0.0, 0.0
+    volume = parts.volume[e]
+    if a < 0.0 and b < 0.0 and c < 0.0 and d < 0.0:
+        share = parts.share[parts.share_row[e]]
+        return volume * share[0], volume * share[1], volume * share[2], volume * share[3]
+    begin, end = parts.start[e], parts.start[e + np.uint64(1)]
+    if begin == end:
+        x, y, z, w = moments_below(a, b, c, d)
+        return volume * x, volume * y, volume * z, volume * w
+    x, y, z, w = 0.0, 0.0, 0.0, 0.0
+    for t in range(begin, end):
+        corners = parts.corners[t]
         for q in range(4):
-            local[q] = 0.0
-            for a in range(4):
-                local[q] += parts.corners[t, q, a] * phi[a]
+            local[q] = 0.0 + corners[q, 0] * a + corners[q, 1] * b + corners[q, 2] * c + corners[q, 3] * d
         wet_moments(local, out)
         for q in range(4):
             weight = parts.fan_volume[t] * out[q]
-            for a in range(4):
-                total[a] += weight * parts.corners[t, q, a]
+            x += weight * corners[q, 0]
+            y += weight * corners[q, 1]
+            z += weight * corners[q, 2]
+            w += weight * corners[q, 3]
+    return x, y, z, w
 
 
 def nodal_water(cell_list, shift, phi, parts, n_nodes):
@@ -130,25 +143,36 @@ def nodal_water(cell_list, shift, phi, parts, n_nodes):
 
 @released
 def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
-    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    local, out = np.empty(4), np.empty(4)
     cells, volume, share, share_row = parts.cells, parts.volume, parts.share, parts.share_row
     water[first:last] = 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = np.uint64(cell_list[s])
-            n_wet = 0
-            for a in range(4):
-                at[a] = phi[cells[e, a]] + shift
-                n_wet += at[a] < 0.0
-            if n_wet == 4:  # most cells: not worth a call
-                for a in range(4):
-                    if first <= cells[e, a] < last:
-                        water[cells[e, a]] += volume[e] * share[share_row[e], a]
-            elif n_wet > 0 and owns_any(first, last, cells, e):
-                part_moments(e, at, parts, total, local, out)
-                for a in range(4):
-                    if first <= cells[e, a] < last:
-                        water[cells[e, a]] += total[a]
+            e = np.uint64(cell_list[np.uint64(s)])
+            i, j, k, m = cells[e, 0], cells[e, 1], cells[e, 2], cells[e, 3]
+            at = (phi[i] + shift, phi[j] + shift, phi[k] + shift, phi[m] + shift)
+            if at[0] < 0.0 and at[1] < 0.0 and at[2] < 0.0 and at[3] < 0.0:  # most cells: not worth a call
+                row, size = share_row[e], volume[e]
+                held = (
+                    size * share[row, 0],
+                    size * share[row, 1],
+                    size * share[row, 2],
+                    size * share[row, 3],
+                )
+            elif at[0] < 0.0 or at[1] < 0.0 or at[2] < 0.0 or at[3] < 0.0:
+                if not owns_any(first, last, cells, e):
+                    continue
+                held = part_moments(e, at, parts, local, out)
+            else:
+                continue
+            if first <= i < last:
+                water[i] += held[0]
+            if first <= j < last:
+                water[j] += held[1]
+            if first <= k < last:
+                water[k] += held[2]
+            if first <= m < last:
+                water[m] += held[3]
 
 
 def wet_fraction(cell_list, phi, parts):
@@ -160,7 +184,7 @@ def wet_fraction(cell_list, phi, parts):
 
 @released
 def _wet_fraction(first, last, cell_list, phi, parts, share):
-    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    local, out = np.empty(4), np.empty(4)
     cells, start = parts.cells, parts.start
     for place in range(first, last):
         s = np.uint64(place)
@@ -169,9 +193,8 @@ def _wet_fraction(first, last, cell_list, phi, parts, share):
         if a < 0.0 and b < 0.0 and c < 0.0 and d < 0.0 and start[e] == start[e + np.uint64(1)]:
             share[s] = 1.0  # most cells: not worth a call
             continue
-        at[0], at[1], at[2], at[3] = a, b, c, d
-        part_moments(e, at, parts, total, local, out)
-        share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
+        x, y, z, w = part_moments(e, (a, b, c, d), parts, local, out)
+        share[s] = min((x + y + z + w) / parts.volume[e], 1.0)
 
 
 @kernel

@@ -356,7 +356,7 @@ def _probed(first, last, runs, cell_list, phi, spacing, parts, held):
 
     One array for both: to go through a tuple of two counts references to them in every turn, and a count that all
     threads change at once made two take half as long again as one."""
-    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    local, out = np.empty(4), np.empty(4)
     cells = parts.cells
     held[:, first:last] = 0.0
     for run in range(runs.shape[0]):
@@ -364,13 +364,24 @@ def _probed(first, last, runs, cell_list, phi, spacing, parts, held):
             e = np.uint64(cell_list[s])
             if not owns_any(first, last, cells, e):
                 continue
+            i, j, k, m = cells[e, 0], cells[e, 1], cells[e, 2], cells[e, 3]
             for side in range(2):
-                for a in range(4):
-                    at[a] = phi[cells[e, a]] + (2 * side - 1) * _PROBE * spacing[cells[e, a]]
-                part_moments(e, at, parts, total, local, out)
-                for a in range(4):
-                    if first <= cells[e, a] < last:
-                        held[side, cells[e, a]] += total[a]
+                way = (2 * side - 1) * _PROBE
+                at = (
+                    phi[i] + way * spacing[i],
+                    phi[j] + way * spacing[j],
+                    phi[k] + way * spacing[k],
+                    phi[m] + way * spacing[m],
+                )
+                x, y, z, w = part_moments(e, at, parts, local, out)
+                if first <= i < last:
+                    held[side, i] += x
+                if first <= j < last:
+                    held[side, j] += y
+                if first <= k < last:
+                    held[side, k] += z
+                if first <= m < last:
+                    held[side, m] += w
     for i in range(first, last):
         if held[0, i] != held[1, i]:
             # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative

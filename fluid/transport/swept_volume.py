@@ -28,7 +28,7 @@ from fluid.domain.layers import WORK
 from fluid.domain.moments import part_moments
 from fluid.numerics.fields import copied, nothing
 from fluid.surface.volume import Flux, edge_rates
-from kernels.decorators import ranged, released
+from kernels.decorators import inner, ranged, released
 from kernels.threads import found_over, over, owning, reach_of_rows, taken, zeros
 
 NEAR = 3.0
@@ -153,28 +153,30 @@ def _after(first, last, nodes, beyond, phi, u, dt, mesh, volume, out):
 def _by_share(first, last, cell_list, phi, after, parts, u, velocity, beside):
     """u (M, 3) times the wet share of the fluid part of the listed cells, mean over the step by Simpson's rule; the
     corners of those that are cut are marked (N,) bool."""
-    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    local, out = np.empty(4), np.empty(4)
     for s in range(first, last):
-        e, share, n_wet = np.uint64(cell_list[s]), 0.0, 0
-        for a in range(4):
-            i = parts.cells[e, a]
-            n_wet += (phi[i] < 0.0) + (after[i] < 0.0)
-        if n_wet == 8 and parts.start[e] == parts.start[e + np.uint64(1)]:
+        e, share = np.uint64(cell_list[np.uint64(s)]), 0.0
+        i, j, k, m = parts.cells[e, 0], parts.cells[e, 1], parts.cells[e, 2], parts.cells[e, 3]
+        a, b, c, d, p, q, r, t = phi[i], phi[j], phi[k], phi[m], after[i], after[j], after[k], after[m]
+        wet = a < 0.0 and b < 0.0 and c < 0.0 and d < 0.0 and p < 0.0 and q < 0.0 and r < 0.0 and t < 0.0
+        some = a < 0.0 or b < 0.0 or c < 0.0 or d < 0.0 or p < 0.0 or q < 0.0 or r < 0.0 or t < 0.0
+        if wet and parts.start[e] == parts.start[e + np.uint64(1)]:
             share = 1.0
-        elif n_wet > 0:
-            for stage in range(3):
-                for a in range(4):
-                    i = parts.cells[e, a]
-                    at[a] = phi[i] if stage == 0 else after[i] if stage == 2 else 0.5 * (phi[i] + after[i])
-                part_moments(e, at, parts, total, local, out)
-                part = (total[0] + total[1] + total[2] + total[3]) / parts.volume[e]
-                share += (4.0 if stage == 1 else 1.0) * min(part, 1.0)
-            share /= 6.0
-        for k in range(3):
-            velocity[e, k] = share * u[e, k]
+        elif some:
+            middle = (0.5 * (a + p), 0.5 * (b + q), 0.5 * (c + r), 0.5 * (d + t))
+            before = _wet_share(e, (a, b, c, d), parts, local, out)
+            share = before + 4.0 * _wet_share(e, middle, parts, local, out)
+            share = (share + _wet_share(e, (p, q, r, t), parts, local, out)) / 6.0
+        velocity[e, 0], velocity[e, 1], velocity[e, 2] = share * u[e, 0], share * u[e, 1], share * u[e, 2]
         if 0.0 < share < WHOLE:
-            for a in range(4):
-                beside[parts.cells[e, a]] = True
+            beside[i], beside[j], beside[k], beside[m] = True, True, True, True
+
+
+@inner
+def _wet_share(e, phi, parts, local, out):
+    """Share of the fluid part of cell e that is water with the four values φ at its corners."""
+    x, y, z, w = part_moments(e, phi, parts, local, out)
+    return min((x + y + z + w) / parts.volume[e], 1.0)
 
 
 @ranged
@@ -185,22 +187,22 @@ def _difference(first, last, runs, nodes, reached, weight, edges, swept, moved, 
     dt, rate = swept
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
-            i = nodes[place]
-            own = first <= i < last
-            if weight[i] == 0.0:
+            i = np.uint64(nodes[np.uint64(place)])
+            own, share = first <= np.int64(i) < last, weight[i]
+            if share == 0.0:
                 continue
-            r = graph_row[i]
-            for s in range(start[r], start[r + 1]):
+            r = np.uint64(graph_row[i])
+            for s in range(start[r], start[r + np.uint64(1)]):
                 j = neighbour[s]
-                back = graph_row[j]
                 theirs = not reached[j] and first <= j < last
-                if weight[j] == 0.0 or back < 0 or not (own or theirs):
+                if weight[j] == 0.0 or graph_row[j] < 0 or not (own or theirs):
                     continue
-                came = 0.0
-                for b in range(start[back], start[back + 1]):
+                came, back = 0.0, np.uint64(graph_row[j])
+                for b in range(start[back], start[back + np.uint64(1)]):
                     if neighbour[b] == i:
                         came = moved[b]
-                more = min(weight[i], weight[j]) * (dt * rate[s] - (moved[s] - came))
+                        break
+                more = min(share, weight[j]) * (dt * rate[s] - (moved[s] - came))
                 if own:
                     out[i] -= more
                 if theirs:
