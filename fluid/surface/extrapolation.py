@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from array_types import Bools, Floats
+from array_types import Bools, Floats, Ints
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
 from fluid.numerics.fields import copied_at, marks_of
@@ -274,21 +274,45 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float, wanted=None):
     cells, whose slope the continuation carries to the surface many times too large, grow without averages: by 0.01 to
     0.02 a step where the surface lies just below a layer of nodes, by 0.005 after one sweep. More than one slows a bore
     into two cells of water by 15 %."""
-    t, sweeps = topology, SWEEPS + 1 if calm > 0.0 else 1
+    return _slope_there(topology, _where_sloped(topology, cell_list, marked, calm, wanted), u)
+
+
+class _Sloped(NamedTuple):
+    """Where `smoothed_slope` finds slopes, whatever the field: marked (N,) bool · calm · has (N,) bool: nodes that have
+    one · order, start: layers of them around the cells that are not all marked, of which each average reads one more ·
+    cells (n,) around these · wanted (k,) nodes · kept (N,) bool: those that get a slope."""
+
+    marked: Bools
+    calm: float
+    has: Bools
+    order: Ints
+    start: Ints
+    cells: Ints
+    wanted: Ints
+    kept: Bools
+
+
+def _where_sloped(t, cell_list, marked, calm: float, wanted) -> _Sloped:
+    n, sweeps = len(marked), SWEEPS + 1 if calm > 0.0 else 1
     has, beside = _with_field(cell_list, marked, t.cells)
     # each sweep reads one layer of nodes farther in than it is to be right on
     order, start, _ = layers_around(beside & has, sweeps, t.around[0], t.around[1], has)
-    slope = mean_gradients(_cells_of(order, cell_list, t.cells, len(u)), marked, u, t.fluid_cells, has)
-    found = [slope]
-    for k in range(sweeps):
-        found.append(_averaged(order[: start[sweeps - k]], has, found[-1], t))
-    once, before, slope = found[1], *found[-2:]
-    if sweeps > 1:
-        over(_combined, start[1], order, calm, once, before, slope)
     # values are also continued from marked nodes whose other cells with dry corners are not listed
     wanted = numbers_of(marked) if wanted is None else wanted
-    kept = marks_of(order[: start[1]], len(u))
-    over(_clear_unless, len(wanted), wanted, kept, marked, once.reshape(len(u), -1))
+    cells, kept = _cells_of(order, cell_list, t.cells, n), marks_of(order[: start[1]], n)
+    return _Sloped(marked, calm, has, order, start, cells, wanted, kept)
+
+
+def _slope_there(t, where: _Sloped, u):
+    """The slope (N, 3, 3) of `smoothed_slope` of a field u (N, 3)."""
+    order, start, sweeps = where.order, where.start, len(where.start) - 2
+    found = [mean_gradients(where.cells, where.marked, u, t.fluid_cells, where.has)]
+    for k in range(sweeps):
+        found.append(_averaged(order[: start[sweeps - k]], where.has, found[-1], t))
+    once, before, slope = found[1], *found[-2:]
+    if sweeps > 1:
+        over(_combined, start[1], order, where.calm, once, before, slope)
+    over(_clear_unless, len(where.wanted), where.wanted, where.kept, where.marked, once.reshape(len(u), -1))
     return once
 
 
@@ -479,11 +503,12 @@ def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced,
     t, (order, start) = topology, layers
     if rubbed is not None:
         wet_cells = wet_cells[~rubbed[t.cells[wet_cells]].any(axis=1)]
-    gradient = smoothed_slope(t, wet_cells, wet, u, calm, order[: start[1]])
+    sloped = _where_sloped(t, wet_cells, wet, calm, order[: start[1]])
+    gradient = _slope_there(t, sloped, u)
     least = _own_speed(order[start[1] :], 1.0 + WAVE_SLACK * calm, forced)
     _clear_outside(order, u, a)
     _fill(t, order, start, LINEAR_LAYERS, u, gradient, wet.copy(), least)
     linear, slope = 0, _NO_SLOPE
     if calm > 0.0:
-        linear, slope = LINEAR_LAYERS, smoothed_slope(t, wet_cells, wet, calm * a, calm, order[: start[1]])
+        linear, slope = LINEAR_LAYERS, _slope_there(t, sloped, calm * a)
     _fill(t, order, start, linear, a, slope, wet.copy(), _NO_LIMIT)

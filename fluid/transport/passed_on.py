@@ -231,13 +231,19 @@ def _through_water(first, last, band, edges, spacing, volumes, made):
     of it times h (n,). volumes (N,) [m³]: what nodes hold now and in the end, the more of which counts, and could
     hold."""
     (now, in_the_end, capacity), (stiffness, anchor) = volumes, made
-    for r in range(first, last):
-        i, total = band[r], 0.0
+    row, start, neighbour, given = edges.row, edges.start, edges.neighbour, edges.stiffness
+    for place in range(first, last):
+        i, total = np.uint64(band[np.uint64(place)]), 0.0
+        r, size = np.uint64(row[i]), spacing[i]
         # a body may have taken all room of a node that still holds water
         own = max(now[i], in_the_end[i]) / max(capacity[i], 1e-300)
-        for s in range(edges.start[edges.row[i]], edges.start[edges.row[i] + 1]):
-            j = edges.neighbour[s]
+        for s in range(start[r], start[r + np.uint64(1)]):
+            if given[s] == 0.0:  # half of the edges of a split brick
+                stiffness[s] = given[s]
+                continue
+            j = neighbour[s]
             least = min(own, max(max(now[j], in_the_end[j]), 0.0) / max(capacity[j], 1e-300))
-            stiffness[s] = edges.stiffness[s] * min(least / CONDUCTING, 1.0)
-            total -= 0.5 * (spacing[i] + spacing[j]) * min(stiffness[s], 0.0)
-        anchor[r] = ANCHOR * total
+            conducts = given[s] * min(least / CONDUCTING, 1.0)
+            stiffness[s] = conducts
+            total -= 0.5 * (size + spacing[j]) * min(conducts, 0.0)
+        anchor[np.uint64(place)] = ANCHOR * total

@@ -229,11 +229,13 @@ def _by_speed(first, last, nodes, u, gravity, viscosity, spacing, weight):
 @ranged
 def _wider(first, last, nodes, edges, weight, wider):
     """The largest weight (N,) of each node and those around it."""
+    row, start, neighbour = edges.row, edges.start, edges.neighbour
     for place in range(first, last):
-        i = nodes[place]
-        r = edges.row[i]
-        for s in range(edges.start[r], edges.start[r + 1]):
-            wider[i] = max(wider[i], weight[edges.neighbour[s]])
+        i = np.uint64(nodes[np.uint64(place)])
+        r, largest = np.uint64(row[i]), wider[i]
+        for s in range(start[r], start[r + np.uint64(1)]):
+            largest = max(largest, weight[neighbour[s]])
+        wider[i] = largest
 
 
 @inner

@@ -73,8 +73,8 @@ def _changed(first, last, change, water):
 def _add(first, last, nodes, graph_row, start, moved, total):
     """Add the volumes that left along the edges of the listed nodes to the total (edges,)."""
     for place in range(first, last):
-        r = graph_row[nodes[place]]
-        for s in range(start[r], start[r + 1]):
+        r = np.uint64(graph_row[np.uint64(nodes[np.uint64(place)])])
+        for s in range(start[r], start[r + np.uint64(1)]):
             total[s] += moved[s]
 
 
