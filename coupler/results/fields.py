@@ -35,6 +35,7 @@ class WaterWriter:
         self._geometry = None
         self._place = None
         self._last_time = None
+        self._of_cells = {}
         if keep is None:
             vtkhdf.create(self.path, "UnstructuredGrid", self.origin)
         else:
@@ -46,16 +47,19 @@ class WaterWriter:
         """Write one step.
 
         time [s] · nodes (n, 3) [m] · cells (m, 4) rows of nodes · point_data {name: (n,) or (n, 3)} ·
-        cell_data {name: (m,) or (m, 3)}; the same names at every step.
+        cell_data {name: (m,) or (m, 3)}; the same names at every step. An array of cells that is the same object as in
+        the step before is not written again.
         Raises NotFinite, WrongShape or DiskFull; the steps written before stay readable in each case.
         """
         where = f"{self.path} at t = {time:.6g} s"
+        again = [a for a, values in cell_data.items() if values is self._of_cells.get(a)]
         nodes, cells = rows("nodes", nodes, len(nodes), where), np.asarray(cells)
         point = {
             a: vtkhdf.single(finite(a, rows(a, v, len(nodes), where), where)) for a, v in point_data.items()
         }
         cell = {
-            a: vtkhdf.single(finite(a, rows(a, v, len(cells), where), where)) for a, v in cell_data.items()
+            a: v if a in again else vtkhdf.single(finite(a, rows(a, v, len(cells), where), where))
+            for a, v in cell_data.items()
         }
         finite("nodes", nodes, where)
         changed = self._changed(nodes, cells)
@@ -72,9 +76,9 @@ class WaterWriter:
             k = vtkhdf.count(root)
             vtkhdf.write_offsets(root["Steps"], k, **self._place)
             vtkhdf.write_data(root, "PointData", k, point)
-            vtkhdf.write_data(root, "CellData", k, cell)
+            vtkhdf.write_data(root, "CellData", k, cell, again)
             vtkhdf.publish(file, k, time)
-        self._geometry, self._last_time = (nodes, cells), time
+        self._geometry, self._last_time, self._of_cells = (nodes, cells), time, dict(cell_data)
 
     def _changed(self, nodes, cells):
         """Whether the mesh differs from that of the last step, as far as the file can tell (the same arrays need no

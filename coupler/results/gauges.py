@@ -108,12 +108,15 @@ def _level(spec, rows_of) -> Gauge:
 
 
 def _pressure(spec, rows_of) -> Gauge:
-    at = np.array(spec.at)
+    at, places, domain = np.array(spec.at), None, None
 
     def value(coupling):
-        from fluid.readings.gauges import pressure
+        from fluid.readings.gauges import Places, pressure_at
 
-        return pressure(coupling.water, at)
+        nonlocal places, domain
+        if domain is not coupling.water.domain:
+            places, domain = Places.of(coupling.water, at), coupling.water.domain
+        return float(pressure_at(coupling.water, places)[0])
 
     return _in_time(spec, "pressure", "Pa", f"pressure at {spec.at}, zero in the air", value)
 

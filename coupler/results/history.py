@@ -34,6 +34,8 @@ class BadTable(SurgebreakError):
     exit_code = ExitCode.BAD_CASE
 
 
+QUOTED = ('"', "\n", "\r")
+"""What, beside a comma, puts a cell into quotes."""
 MOST_BYTES = 4_000_000_000
 """Size of a table that is read: millions of steps."""
 
@@ -101,12 +103,13 @@ class HistoryTable:
         if keep is not None:
             self._check_kept(keep)
         self._file = open(self.path, mode, newline="", encoding="utf-8")  # noqa: SIM115 (lives as long as the run)
+        self._size = 0
         if keep is None:
             self._write(header(self._title, self.columns))
         else:
-            self._rows, size = keep
-            self._file.truncate(size)
-            self._file.seek(size)
+            self._rows, self._size = keep
+            self._file.truncate(self._size)
+            self._file.seek(self._size)
 
     def _check_kept(self, keep):
         """Check that the table exists, has these columns, and is at least as long as it was."""
@@ -120,7 +123,7 @@ class HistoryTable:
     @property
     def place(self):
         """Rows and bytes written so far."""
-        return self._rows, self._file.tell()
+        return self._rows, self._size
 
     def append(self, **row):
         """Write one row, every column by its name; None leaves a cell empty, NaN and infinity are refused.
@@ -137,23 +140,25 @@ class HistoryTable:
         self._rows += 1
 
     def _cell(self, name, value):
-        if value is None or isinstance(value, str):
-            return value or ""
+        if type(value) is not float:
+            if value is None or isinstance(value, str):
+                return value or ""
+            value = value.item() if hasattr(value, "item") else value
         if not math.isfinite(value):
             raise NotFinite(f"{self.path}: {name} is {value} in row {self._rows}; None leaves a cell empty")
-        return number(value)
+        return repr(value) if type(value) is float else number(value)
 
     def _write(self, text):
         """Write and flush; if the disk is full, the incomplete line is removed."""
-        whole = self._file.tell()
         try:
             self._file.write(text)
             self._file.flush()
         except OSError as error:
             if error.errno not in FULL:
                 raise
-            self._abandon(whole)
+            self._abandon(self._size)
             raise DiskFull(self.path, len(text), f"and holds {self._rows} rows", error) from None
+        self._size += len(text.encode("utf-8"))
 
     def _abandon(self, whole):
         """Cut the file back to its last complete row and discard what Python has buffered."""
@@ -185,6 +190,14 @@ def header(title, columns):
 
 def line(cells):
     """One CSV line."""
+    text = ",".join(cells)
+    if text.count(",") == len(cells) - 1 > 0 and not any(mark in text for mark in QUOTED):
+        return text + "\n"
+    return _quoted(cells)
+
+
+def _quoted(cells):
+    """One CSV line, some cells of which stand in quotes."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(cells)
     return text.getvalue()

@@ -36,17 +36,17 @@ class TankTop:
         self._top = np.flatnonzero(nodes[:, 2] >= self.height - NEAR * (self.height - low))
         self._places = nodes[self._top, :2]
         self._reached = REACHED * water.mesh.node_size[self._top]
+        self._domain, self._copies = None, []
         self._at_start = self._wet(water)
         self.first, self.place, self.share, self.share_at = NEVER, np.zeros(2), 0.0, NEVER
 
     def _wet(self, water: Water) -> Array:
         """(k,) bool: whether each node at the top, or at least one of its copies, is wet."""
-        parent, found = water.domain.parent_node, np.zeros(len(self._top), bool)
-        first, last = (np.searchsorted(parent, self._top, side) for side in ("left", "right"))
-        for copy in range(int((last - first).max(initial=0))):
-            has = np.flatnonzero(first + copy < last)
-            own = first[has] + copy
-            found[has] |= water.topology.active[own] & (water.level_set[own] < self._reached[has])
+        if water.domain is not self._domain:
+            self._domain, self._copies = water.domain, _copies(water, self._top)
+        found = np.zeros(len(self._top), bool)
+        for has, own in self._copies:
+            found[has] |= water.level_set[own] < self._reached[has]
         return found
 
     def step(self, water: Water, time: float) -> bool:
@@ -86,6 +86,18 @@ class TankTop:
         """Restore the state that `save` returned."""
         self.first, x, y, self.share, self.share_at = map(float, saved["numbers"])
         self.place, self._at_start = np.array([x, y]), saved["at_start"].copy()
+
+
+def _copies(water: Water, top) -> list[tuple[Array, Array]]:
+    """Of the nodes top (k,) of the mesh, the first, second, ... copies that take part: which of them have one (n,), and
+    its number in the domain (n,)."""
+    parent, found = water.domain.parent_node, []
+    first, last = (np.searchsorted(parent, top, side) for side in ("left", "right"))
+    for copy in range(int((last - first).max(initial=0))):
+        has = np.flatnonzero(first + copy < last)
+        has = has[water.topology.active[first[has] + copy]]
+        found.append((has, first[has] + copy))
+    return found
 
 
 def reached(found: dict[str, Any]) -> str:

@@ -126,15 +126,15 @@ def write_offsets(steps, k, part, point, cell, connectivity):
 def write_data(root, kind, k, values, again=()):
     """Append the arrays of one step to /VTKHDF/PointData or CellData (`kind`), and note where they begin.
 
-    Names in `again` do not change in time: they are written with step 0 and pointed at afterwards.
+    Names in `again` are the same as in the step before: what that one points at is pointed at again.
     """
     offsets = root["Steps"][kind + "Offsets"]
     for name, array in values.items():
         if name not in root[kind]:
             growing(root[kind], name, array)
             table(offsets, name)
-        start = 0 if name in again and k > 0 else extend(root[kind][name], array)
-        set_row(offsets[name], k, start)
+        known = name in again and k > 0
+        set_row(offsets[name], k, offsets[name][k - 1] if known else extend(root[kind][name], array))
 
 
 def publish(file, k, time):

@@ -175,13 +175,17 @@ def _up_to_the_bed(water, places, foot, inside, outside) -> Array:
 def pressure(water, points):
     """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the open air, that of the pocket in trapped
     air, NaN inside a solid. Raises Outside for a point outside the mesh."""
-    places = Places.of(water, points)
+    p = pressure_at(water, Places.of(water, points))
+    return p if np.ndim(points) == 2 else float(p[0])
+
+
+def pressure_at(water, places: Places) -> Array:
+    """`pressure` (m,) [Pa] at places that were looked up on the present domain, and stay while it does."""
     in_air = places.read(water.level_set) >= 0.0
     of_air = nothing(len(water.level_set)) if water.air is None else water.air.nodal(water.air.mean_pressure)
     p = np.where(places.inside, np.nan, pressure_below_surface(water, places, of_air))
     there = of_air[places.corners]
-    p = np.where(in_air, there[np.arange(len(p)), np.abs(there).argmax(axis=1)], p)
-    return p if np.ndim(points) == 2 else float(p[0])
+    return np.where(in_air, there[np.arange(len(p)), np.abs(there).argmax(axis=1)], p)
 
 
 def pocket_at(water, point) -> int | None:

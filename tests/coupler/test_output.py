@@ -90,6 +90,23 @@ def test_a_still_mesh_is_stored_once(tmp_path):
         assert len(file["VTKHDF/PointData/pressure"]) == 5 * len(file["VTKHDF/Points"])
 
 
+def test_a_field_of_cells_that_stays_is_stored_once(tmp_path):
+    """The share of cells outside of solids at rest is the same array in every state; one that is new is stored, and
+    every state reads back its own."""
+    path = tmp_path / "fields.vtkhdf"
+    nodes, cells = tank_mesh((2.0, 1.0, 1.0), 0.5)
+    writer = WaterWriter(path)
+    shares = [fields(seed, 1, len(cells))[1]["fluid_fraction"] for seed in (7, 8)]
+    written = [shares[0], shares[0], shares[1], shares[1], shares[0]]
+    for k, share in enumerate(written):
+        writer.append(0.1 * k, nodes, cells, fields(k, len(nodes), 1)[0], {"fluid_fraction": share})
+    for k, share in enumerate(written):
+        found = vtkhdf.read_step(path, k)[2]["fluid_fraction"]
+        np.testing.assert_array_equal(found, share.astype(np.float32))
+    with h5py.File(path, "r") as file:
+        assert len(file["VTKHDF/CellData/fluid_fraction"]) == 3 * len(cells)
+
+
 def test_vtk_reads_back_the_blocks(tmp_path):
     """Placed vertices are centre + rotation @ vertex; block data come back on each face of the block."""
     rng = np.random.default_rng(3)
