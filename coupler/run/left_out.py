@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import sys
 
-from coupler.step.observe import wet_cells
-
 HEAVY = (
     "fluid", "yade_scripts", "yade", "scipy", "numba", "h5py", "skfem", "pint", "matplotlib", "pyvista",
     "vtkmodules",
@@ -40,7 +38,7 @@ def _of_water(coupling, record) -> dict[str, int]:
     return {
         "mesh_cells": len(water.mesh.cells),
         "cells": len(topology.cells),
-        "wet_cells": wet_cells(water),
+        "wet_cells": water.report.wet_cells,
         "bodies": water.domain.n_bodies,
         "bodies_cut": record.bodies_cut,
         "passes": record.passes,

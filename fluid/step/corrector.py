@@ -398,6 +398,7 @@ def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
         reinserted=kept.reinserted,
         clipped=clipped,
         unknowns=len(x),
+        wet_cells=len(kept.wet_cells) + len(kept.void),
         work_on_bodies=-problem.dt * _power_on_bodies(problem, x, bound.rate),
         energy_change=change,
         momentum=momentum,

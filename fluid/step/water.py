@@ -83,6 +83,8 @@ class Water:
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
         self._late_energy = 0.0
+        self._summed: tuple[tuple, float] = (None, None, None), 0.0
+        """The volume, and the arrays that it was summed from: a step replaces them by new ones."""
         self.report: StepReport | None = None
         self.sides = sides
         self.slits, self.films, self._film_rules = None, None, None
@@ -451,8 +453,11 @@ class Water:
     # ---- figures
 
     def volume(self) -> float:
-        """Water in the tank [m³]."""
-        return total(self.nodal_water) - total(self.displaced) - self.film_volume
+        """Water in the tank [m³]; balances, limits and histories of a step all ask for it."""
+        water, displaced, in_films = of = self.nodal_water, self.displaced, self.film_volume
+        if any(one is not other for one, other in zip(self._summed[0], of)):
+            self._summed = of, total(water) - total(displaced) - in_films
+        return self._summed[1]
 
     def displacement(self, dt: float) -> Array:
         """Volume (N,) [m³] that the bodies have displaced at the nodes since the cells were cut, at the end of a step
