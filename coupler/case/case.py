@@ -299,7 +299,7 @@ class Joints(Section):
     strength: Annotated[float, InSI("Pa", gt=0)] | None = Field(
         None,
         description="T_max, largest traction; needed unless the material of every block is a preset, such as "
-        '"brick-masonry" (`explain concrete`)',
+        '"brick-masonry" (`explain concrete`), or every joint of another material has its [[joints.pair]]',
         examples=["0.5 MPa"],
     )
     opening_at_failure: PositiveLength | None = Field(

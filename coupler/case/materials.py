@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from coupler.case.case import Case, ContactPair, JointPair
+from coupler.case.case import Case, ContactPair, JointPair, Joints
 from coupler.case.types import KeyPath
 from coupler.program.errors import did_you_mean
 
@@ -97,16 +97,17 @@ def with_presets(case: Case) -> Case:
 def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
     """The case with strength and opening of all joints, and what is missing for that.
 
-    Where every block that can move is of a preset, all joints follow from presets, and [joints] need not say them; the
-    weakest of the presets stands for them then. Missing values are filled in, so that the rest can be checked too."""
+    Where every block that can move is of a preset, or of a material whose joints [[joints.pair]] describes or leaves
+    out, [joints] need not say them; the weakest of the presets stands for them then. Missing values are filled in, so
+    that the rest can be checked too."""
     j = case.joints
     if j is None or (j.strength is not None and j.opening_at_failure is not None):
         return case, []
     movable, used = _materials(case, held=False), presets_of(case)
-    others = [name for name in movable if name not in PRESETS]
     mistakes: list[tuple[KeyPath, str]] = []
     for name, example in (("strength", "0.5 MPa"), ("opening_at_failure", "5 mm")):
-        if getattr(j, name) is None and (others or not used):
+        others = _lacking(case, j, name)
+        if getattr(j, name) is None and (others or not movable):
             mistakes.append((("joints", name), f'missing; for instance "{example}"{_why(others)}'))
     weakest = _weakest(used.values()) if used else PRESETS["brick-masonry"]
     given = {
@@ -116,13 +117,49 @@ def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
     return case.model_copy(update={"joints": j.model_copy(update=given)}), mistakes
 
 
-def _why(others: list[str]) -> str:
-    """The end of a message that names a material without a preset; empty without one."""
-    if not others:
+def _lacking(case: Case, joints: Joints, value: str) -> list[tuple[str, str]]:
+    """Pairs (material, name) of blocks that can move without a preset and of what may touch them, for which no
+    [[joints.pair]] says that there is no joint, or this value of it."""
+    if case.structure is None:
+        return []
+    tables = [({material, getattr(table, "name", None), getattr(table, "group", None)}, material, held)
+              for table, material, held in _tables(case) if material]  # fmt: skip
+    touched = [(names, material) for names, material, _ in tables]
+    touched += [({name}, name) for name in sorted(_planes(case)) if joints.ground]
+    return list(
+        dict.fromkeys(
+            (material, other)
+            for names, material, held in tables
+            if not held and material not in PRESETS
+            for others, other in touched
+            if not _says(joints.pair, names, others, value)
+        )
+    )
+
+
+def _says(pairs: Iterable[JointPair], names: set[str | None], others: set[str | None], value: str) -> bool:
+    """Whether the last pair between two tables, known by these names, leaves their joints out or gives the value."""
+    fits = [
+        pair
+        for pair in pairs
+        if (pair.between[0] in names and pair.between[1] in others)
+        or (pair.between[1] in names and pair.between[0] in others)
+    ]
+    return bool(fits) and (not fits[-1].joined or getattr(fits[-1], value) is not None)
+
+
+def _why(lacking: list[tuple[str, str]]) -> str:
+    """The end of a message that names a material without a preset, and what its joints are with where other joints of
+    it are described; empty without one."""
+    if not lacking:
         return ""
-    hint = did_you_mean(others[0], list(PRESETS))
-    known = " or ".join(f'"{name}"' for name in PRESETS)
-    return f": material '{others[0]}' has no preset{hint or f'; those of material = {known} follow from it'}"
+    name, other = lacking[0]
+    hint = did_you_mean(name, list(PRESETS))
+    known = " or ".join(f'"{preset}"' for preset in PRESETS)
+    return (
+        f": material '{name}' has no preset{hint or f'; those of material = {known} follow from it'}. Joints of single "
+        f'pairs are given, or left out, by [[joints.pair]], here between = ["{name}", "{other}"]'
+    )
 
 
 def material_remarks(case: Case) -> Iterator[str]:

@@ -165,6 +165,25 @@ def test_a_strength_is_asked_for_where_a_material_has_none(tmp_path):
     assert "joints.opening_at_failure: missing" in opening
 
 
+def test_a_material_whose_joints_are_left_out_needs_no_strength(tmp_path):
+    """Loose crates beside a masonry house: with no joint of theirs there is nothing that [joints] could say. What is
+    still missing is named by the two that may touch."""
+    crates = (
+        '[[structure.block]]\nname = "crate"\nsize = [1, 1, 1]\ncentre = [2, 2, 0.5]\nmaterial = "cargo"\n'
+    )
+    loose = '\n[[joints.pair]]\nbetween = ["cargo", "{}"]\njoined = false\n'
+    text = QUAY.replace("[contact]", f"{crates}[contact]", 1)
+
+    def load_with(*others):
+        (tmp_path / "case.toml").write_text(text + "".join(loose.format(name) for name in others))
+        return load(tmp_path).case
+
+    with pytest.raises(BadCase, match=r'between = \["cargo", "cargo"\]'):
+        load_with("brick-masonry", "concrete", "solid", "held")
+    case = load_with("brick-masonry", "concrete", "solid", "held", "cargo")
+    assert case.joints.strength == PRESETS["brick-masonry"].strength
+
+
 def test_a_solid_has_the_density_of_its_material_and_not_that_of_the_blocks(tmp_path):
     """Its density counts for its weight among the loads alone; a quay under crates of 350 kg/m3 weighed as they do."""
     from coupler.geometry.solids import obstacle_blocks
