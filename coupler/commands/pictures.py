@@ -22,18 +22,15 @@ def missing() -> str:
 
 
 def stills(run: Path, folder: Path, times: Sequence[float]) -> str:
-    """A still of each time [s] into folder; the reason if one could not be made, else empty."""
-    for time in times:
-        words = ("--still", "--time", repr(time), "--size", STILL, "--letters", LETTERS, "--to", folder)
-        reason = _view("coupler.commands.view", run, *words)
-        if reason:
-            return reason
-    return ""
+    """A still of each time [s] into folder; the reason if they could not be made, else empty."""
+    at = [word for time in times for word in ("--time", repr(time))]
+    words = ("--still", *at, "--size", STILL, "--letters", LETTERS, "--to", folder)
+    return _view("coupler.commands.view", run, *words)
 
 
 def plots(run: Path, folder: Path) -> str:
     """Figures of the histories and curves over data into folder; the reason if they could not be made."""
-    return _view("coupler.commands.view", run, "--plots", "--to", folder)
+    return _view("coupler.commands.view", run, "--plots", "--for-page", "--to", folder)
 
 
 def flood_map(run: Path, folder: Path, title: str) -> str:

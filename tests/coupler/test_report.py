@@ -13,6 +13,7 @@ from coupler.commands.report import html
 from coupler.commands.report.command import report
 from coupler.commands.report.html import figure, table
 from coupler.commands.report.markdown import to_html
+from coupler.commands.report.run_page import plots
 from coupler.commands.study import command, runner
 from coupler.program import extras
 from coupler.program.errors import NoRun
@@ -161,6 +162,19 @@ def test_a_figure_is_in_the_page(tmp_path):
     assert "data:image/png;base64," in figure(tmp_path / "a.png", "a")
     (tmp_path / "a.svg").write_text("<svg/>", encoding="utf-8")
     assert "data:image/svg+xml;base64," in figure(tmp_path / "a.png", "a")
+
+
+def test_the_pages_of_a_figure_are_in_their_order(tmp_path):
+    """The tenth leaf of a long table follows the ninth, whatever the formats of the leaves."""
+    (tmp_path / "history").mkdir()
+    (tmp_path / "history" / "gauges.csv").touch()
+    names = ["gauges", *(f"gauges_{k}" for k in range(2, 12))]
+    for name in names:
+        (tmp_path / f"{name}.svg").write_text("<svg/>", encoding="utf-8")
+    (tmp_path / "gauges_3.png").write_bytes(b"")
+    shown = plots(tmp_path, tmp_path)
+    assert [path.stem for path in shown] == names
+    assert shown[2].suffix == ".png"
 
 
 def test_a_table_without_rows_is_not_there():

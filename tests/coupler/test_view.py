@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupler.commands.view import figure_files
 from coupler.commands.view.__main__ import main, pixels, rate
 from coupler.commands.view.plots import (
     LINES_PER_PANEL,
@@ -105,6 +106,29 @@ def test_film_and_figures(tmp_path):
     assert film["duration"] == pytest.approx(1.3, abs=0.11)
 
 
+def test_stills_of_one_call_are_those_of_a_call_each(tmp_path):
+    """A report draws its stills in one scene: nothing of one instant may be left in the picture of the next."""
+    run = write_run(tmp_path / "run", [0.0, 1.0, 2.0], cell=2.0)
+    of_a_page = ("--still", "--size", "160x90", "--plots", "--for-page", "--to", tmp_path / "together")
+    assert render(run, "--time", "0", "--time", "2", *of_a_page).returncode == 0
+    assert (
+        render(run, "--still", "--size", "160x90", "--time", "2", "--to", tmp_path / "alone").returncode == 0
+    )
+    drawn = {path.name: path.read_bytes() for path in (tmp_path / "together").iterdir()}
+    assert set(drawn) == {"still_0.000s.png", "still_2.000s.png", "energy.svg", "load.svg"}
+    assert drawn["still_2.000s.png"] == (tmp_path / "alone" / "still_2.000s.png").read_bytes()
+
+
+def test_a_page_gets_the_smaller_format_of_a_large_figure(tmp_path, monkeypatch):
+    """A line of many points has a large SVG; beside that there is a PNG, of which the page takes the smaller."""
+    monkeypatch.setattr(figure_files, "LARGE", 20_000)
+    for name, points in (("few", 10), ("many", 3000)):
+        drawing, axis = plt.subplots()
+        axis.plot(np.random.default_rng(1).random(points))
+        figure_files.save(drawing, tmp_path / name, figure_files.FOR_A_PAGE)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["few.svg", "many.png", "many.svg"]
+
+
 def test_a_run_that_is_still_being_written_can_be_looked_at(tmp_path):
     """The writer goes on while the viewer has the file open: neither stops the other."""
     nodes, cells = tank_mesh((4.0, 2.0, 2.0), 0.5)
@@ -160,6 +184,31 @@ def test_a_killed_run_is_shown_and_said_to_be_one(tmp_path):
         done = render(run, "--still", "--size", "160x90")
         assert done.returncode == 0, done.stderr
         assert ("the run was killed" in done.stdout) == killed
+
+
+def test_a_still_shows_the_struck_side_although_the_lee_broke_first(tmp_path):
+    """The synthetic building stands at x = 28 to 48 m, y = 7 to 17 m; its water starts at x = 0 to 15 m. The first
+    break is behind it, at one end or the other; with water from x+ and no break either end is as good."""
+    wanted = []
+    for name, sides, place, azimuth in (
+        ("left", ["x-"], [45.0, 14.0, 1.0], 118.0),
+        ("right", ["x-"], [45.0, 9.0, 1.0], -118.0),
+        ("stands", ["x+"], None, -62.0),
+        ("collapse", [], [45.0, 14.0, 1.0], 118.0),
+    ):
+        run = write_run(tmp_path / name, [0.0], cell=4.0)
+        case = {"water": {"inflow": [{"side": side} for side in sides]}}
+        verdict = {"first_break": place and {"place": place}}
+        (run / "run.json").write_text(json.dumps({"case": case, "figures": {"verdict": verdict}}))
+        wanted.append((run, azimuth))
+    code = (
+        "import sys; from pathlib import Path; from coupler.commands.view.run_files import open_run;"
+        "from coupler.commands.view.camera import side_of; from coupler.commands.view.captions import struck_side;"
+        "print(*(side_of(struck_side(open_run(Path(run)))) for run in sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", code, *(str(run) for run, _ in wanted)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert [float(word) for word in done.stdout.split()] == [azimuth for _, azimuth in wanted]
 
 
 def test_layers_of_water_are_drawn_from_far_to_near(tmp_path):

@@ -11,6 +11,8 @@ from string import Template
 from coupler.program.quantities import quantity
 
 HERE = Path(__file__).parent
+FIGURE = (".svg", ".png")
+"""Endings of a figure that a page can show."""
 KIND = {".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 LARGEST_FILM = 8_000_000
 """Size [bytes] up to which a film is embedded in the page; a larger one is linked."""
@@ -85,11 +87,21 @@ def preformatted(text: str) -> str:
     return f"<pre>{escape(text)}</pre>"
 
 
+def drawn(folder: Path) -> dict[str, Path]:
+    """The figures in a folder by their names without endings."""
+    names = sorted({path.stem for path in folder.iterdir() if path.suffix in FIGURE})
+    return {name: _smaller(folder / f"{name}.png") for name in names}
+
+
+def _smaller(path: Path) -> Path:
+    """Of a figure that exists as SVG and PNG, the smaller file."""
+    files = (path.with_name(f"{path.stem}{ending}") for ending in FIGURE)
+    return min((file for file in files if file.exists()), key=lambda file: file.stat().st_size, default=path)
+
+
 def figure(path: Path, caption: str, wide: bool = True) -> str:
     """A picture embedded in the page; of a figure that exists as SVG and PNG, the smaller file is used."""
-    svg = path.with_name(f"{path.stem}.svg")
-    if path.suffix == ".png" and svg.exists() and svg.stat().st_size < path.stat().st_size:
-        path = svg
+    path = _smaller(path)
     kind = "" if wide else " class=narrow"
     below = "" if path.name.startswith("still_") else f"<figcaption>{escape(caption)}</figcaption>"
     return f'<figure{kind}><img src="{as_data(path)}" alt="{escape(caption)}">{below}</figure>'

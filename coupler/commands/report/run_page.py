@@ -11,6 +11,7 @@ from coupler.commands.explain_run import Skipped, not_loaded, seconds_of, shares
 from coupler.commands.report import tables
 from coupler.commands.report.html import (
     document,
+    drawn,
     facts,
     figure,
     film,
@@ -227,9 +228,11 @@ def plots(run: Path, pictures: Path) -> list[Path]:
 
 
 def _leaves(pictures: Path, stem: str) -> list[Path]:
-    """The figures of a table over several pages: gauges.png, gauges_2.png, ..."""
-    more = sorted(p for p in pictures.glob(f"{stem}_*.png") if p.stem.removeprefix(f"{stem}_").isdigit())
-    return [p for p in (pictures / f"{stem}.png", *more) if p.exists()]
+    """The figures of a table over several pages: gauges.svg, gauges_2.svg, ..."""
+    found = drawn(pictures)
+    more = [name.removeprefix(f"{stem}_") for name in found if name.startswith(f"{stem}_")]
+    leaves = [f"{stem}_{number}" for number in sorted((n for n in more if n.isdigit()), key=int)]
+    return [found[name] for name in (stem, *leaves) if name in found]
 
 
 def over_data(run: Path, pictures: Path) -> list[Path]:
@@ -237,7 +240,7 @@ def over_data(run: Path, pictures: Path) -> list[Path]:
     histories = plots(run, pictures)
     return [
         p
-        for p in sorted(pictures.glob("*.png"))
+        for p in drawn(pictures).values()
         if p not in histories and p.stem not in (*OF_VERDICT, FLOOD) and not p.name.startswith("still_")
     ]
 

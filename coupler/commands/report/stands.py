@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from coupler.commands.report.html import figure, note, table
+from coupler.commands.report.html import drawn, figure, note, table
 from coupler.program.quantities import length, moment_of, percent, quantity
 from coupler.verdict.words import attitude, name_of, point, sentences
 
@@ -25,11 +25,8 @@ def stands(summary: dict, pictures: Path) -> list[str]:
     if not judged:
         return []
     first, *rest = sentences(judged)
-    shown = [
-        figure(pictures / f"{name}.png", words)
-        for name, words in FIGURES.items()
-        if _is_there(pictures, name)
-    ]
+    found = drawn(pictures)
+    shown = [figure(found[name], words) for name, words in FIGURES.items() if name in found]
     return [
         f'<p class="verdict state-{escape(judged["state"])}">{escape(first)}</p>',
         f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in rest)}</ul>",
@@ -63,10 +60,6 @@ def _bores(found: list[dict], judged: dict) -> list[str]:
         "depth against a wall across the tank",
     ]
     return [table([*head, "measured: largest depth beside it"], rows, (0, 1))] if rows else []
-
-
-def _is_there(pictures: Path, name: str) -> bool:
-    return (pictures / f"{name}.png").exists()
 
 
 def _groups(what: str, groups: list[dict], judged: dict, loads: bool = False) -> list[str]:

@@ -37,7 +37,11 @@ def command_line():
         help="draw histories, and curves over the data of the case, as PDF, SVG and PNG",
     )
     parser.add_argument(
-        "--time", type=float, metavar="S", help="time of the still [s]; default: the last stored step"
+        "--time",
+        type=float,
+        action="append",
+        metavar="S",
+        help="time of the still [s]; may be given again, a still each; default: the last stored step",
     )
     parser.add_argument(
         "--size",
@@ -50,7 +54,8 @@ def command_line():
     parser.add_argument(
         "--azimuth",
         type=float,
-        help="direction of the camera in degrees from +x towards +y; default: the side where joints break",
+        help="direction of the camera in degrees from +x towards +y; default: the side that the water strikes, and of "
+        "its two ends that where the first joint broke",
     )
     parser.add_argument(
         "--elevation", type=angle, default=22.0, help="elevation of the camera above the ground in degrees"
@@ -74,6 +79,11 @@ def command_line():
         default=1.0,
         metavar="TIMES",
         help="factor on the size of letters, for a small picture",
+    )
+    parser.add_argument(
+        "--for-page",
+        action="store_true",
+        help="write each figure of --plots only in the format that a page shows: SVG, and PNG beside a large SVG",
     )
     parser.add_argument(
         "--to", type=Path, metavar="FOLDER", help="directory for the pictures; default RUN/pictures"
@@ -165,20 +175,19 @@ def make(options):
         "foam": options.foam,
     }
     if options.still:
-        from coupler.commands.view.pictures import still
+        from coupler.commands.view.pictures import stills
 
-        run.check(options.time)
-        report(still, run, folder, options.size, options.time, **camera)
+        for time in options.time or []:
+            run.check(time)
+        report(stills, run, folder, options.size, options.time or [None], **camera)
     if options.plots:
+        from coupler.commands.view.damage import damage_figures
+        from coupler.commands.view.figure_files import FOR_A_PAGE, FORMATS
+        from coupler.commands.view.over_data import over_data
         from coupler.commands.view.plots import plots
 
-        report(plots, options.run, folder)
-        from coupler.commands.view.damage import damage_figures
-
-        report(damage_figures, options.run, folder)
-        from coupler.commands.view.over_data import over_data
-
-        report(over_data, options.run, folder)
+        for figures in (plots, damage_figures, over_data):
+            report(figures, options.run, folder, FOR_A_PAGE if options.for_page else FORMATS)
     if options.film:
         from coupler.commands.view.pictures import film
 

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from coupler.commands.view.figure_files import save
 from coupler.commands.view.palette import LINES
-from coupler.commands.view.plots import FORMATS, STYLE, _undated, plt, prefixed
+from coupler.commands.view.plots import STYLE, plt, prefixed
 from coupler.commands.view.study import MARKS, share
 
 SIZE = (6.9, 7.2)
@@ -38,9 +39,7 @@ def draw(folder):
         accuracy(axes[2, 1], about, look)
         handles = [plt.Line2D([], [], label=name, **style) for name, style in look.items()]
         drawing.legend(handles=handles, loc="outside upper center", ncols=min(4, len(handles)))
-        for ending in FORMATS:
-            drawing.savefig(folder / f"comparison.{ending}", metadata=_undated(ending))
-        plt.close(drawing)
+        save(drawing, folder / "comparison")
     return folder / "comparison.png"
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
+from coupler.commands.view.figure_files import FORMATS, save
 from coupler.commands.view.palette import INK, LINES
-from coupler.commands.view.plots import FORMATS, STYLE, WIDTH, _undated, plt
+from coupler.commands.view.plots import STYLE, WIDTH, plt
 
 PANEL_HEIGHT, SINGLE = 2.1, 2.9
 """Height [inch] of a panel among others, and of one alone."""
@@ -33,8 +34,8 @@ LEGEND_ROW = 0.16
 """[inch] of a row of the legend above the panels."""
 
 
-def draw(figure, folder):
-    """Draw one figure (the parsed JSON of it) and return the path of its PNG."""
+def draw(figure, folder, endings=FORMATS):
+    """Draw one figure (the parsed JSON of it); its path with the last of the endings."""
     panels, columns = figure["panels"], figure.get("columns", 1)
     rows = -(-len(panels) // columns)
     height = SINGLE if len(panels) == 1 else PANEL_HEIGHT * rows
@@ -51,10 +52,8 @@ def draw(figure, folder):
             drawing.set_figheight(drawing.get_figheight() - LEGEND_ROW * (rows - 1))
         _label_axes_once(axes, panels, columns)
         stem = Path(folder) / figure["name"]
-        for ending in FORMATS:
-            drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
-        plt.close(drawing)
-    return stem.with_suffix(".png")
+        save(drawing, stem, endings)
+    return stem.with_suffix(f".{endings[-1]}")
 
 
 def _named(panel):

@@ -11,8 +11,9 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.ticker import MaxNLocator
 
+from coupler.commands.view.figure_files import FORMATS, save
 from coupler.commands.view.palette import DAMAGE_ENDS, INK, SHADOW, WATER_ENDS, scale
-from coupler.commands.view.plots import FORMATS, STYLE, WIDTH, _undated, plt, prefixed
+from coupler.commands.view.plots import STYLE, WIDTH, plt, prefixed
 from coupler.results import vtkhdf
 from coupler.results.history import read_history
 from coupler.verdict.divisions import in_words
@@ -44,27 +45,25 @@ class Files:
     end: float
 
 
-def damage_figures(run, folder):
-    """Write the figures for which there is data; return the paths of the PDF files."""
+def damage_figures(run, folder, endings=FORMATS):
+    """Write the figures for which there is data; return their paths with the first of the endings."""
     if not (run / "blocks.csv").exists() or not (run / "blocks.vtkhdf").exists():
         return []
     found = read(run)
     parts = shown_parts(found)
     if not parts:
         return []
-    written = []
     with plt.rc_context(STYLE):
+        drawn = {}
         if found.cracks is not None and len(found.cracks["joint"]):
-            written.append(save(over_time(found, parts), folder / "damage"))
+            drawn["damage"] = over_time(found, parts)
             if found.joints:
-                written.append(
-                    save(elevations(found, parts, cracks_on, crack_colours(found)), folder / "cracks")
-                )
+                drawn["cracks"] = elevations(found, parts, cracks_on, crack_colours(found))
         if np.nanmax(found.blocks["pressure"], initial=0.0) > 0.0:
-            written.append(
-                save(elevations(found, parts, pressure_on, pressure_colours(found)), folder / "wall_pressure")
-            )
-    return written
+            drawn["wall_pressure"] = elevations(found, parts, pressure_on, pressure_colours(found))
+        for name, drawing in drawn.items():
+            save(drawing, folder / name, endings)
+    return [folder / f"{name}.{endings[0]}" for name in drawn]
 
 
 def read(run):
@@ -102,14 +101,6 @@ def words(found):
     """How parts are named on the figures."""
     bodies = set(found.blocks["body"])
     return lambda name: in_words(name, bodies)
-
-
-def save(drawing, stem):
-    """Save in every format."""
-    for ending in FORMATS:
-        drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
-    plt.close(drawing)
-    return stem.with_suffix(".pdf")
 
 
 # ---------------------------------------------------------------- damage over time

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.commands.view.figure_files import undated
 from coupler.commands.view.palette import LINES
-from coupler.commands.view.plots import STYLE, _undated, plt
+from coupler.commands.view.plots import STYLE, plt
 from coupler.commands.view.study import DASHES
 from coupler.results.history import read_history
 
@@ -63,7 +64,7 @@ def draw(curves, path):
         arrival = min(curve.arrival for curve in curves.values())
         upper.set_xlim(max(0.0, arrival - BEFORE), max(curve.time[-1] for curve in curves.values()))
         lower.legend(loc="lower right")
-        drawing.savefig(path, metadata=_undated(Path(path).suffix[1:]))
+        drawing.savefig(path, metadata=undated(Path(path).suffix[1:]))
         plt.close(drawing)
 
 

@@ -20,16 +20,17 @@ import numpy as np
 
 from coupler.case.records import column, find_record, read_record
 from coupler.commands.view.curves import draw
+from coupler.commands.view.figure_files import FORMATS
 from coupler.results.history import read_history
 
 
-def over_data(run, folder):
-    """Draw the figures that the case of `run` asks for into `folder`; the paths of the PNGs."""
+def over_data(run, folder, endings=FORMATS):
+    """Draw the figures that the case of `run` asks for into `folder`; their paths with the last of the endings."""
     place = directory_of_case(run)
     if place is None or not (place / "expected.toml").exists():
         return []
     entries = tomllib.loads((place / "expected.toml").read_text(encoding="utf-8")).get("curve", [])
-    return [draw(figure, folder) for figure in figures(entries, run, place)]
+    return [draw(figure, folder, endings) for figure in figures(entries, run, place)]
 
 
 def directory_of_case(run):

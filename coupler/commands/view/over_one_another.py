@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.commands.view.figure_files import save
 from coupler.commands.view.palette import LINES
-from coupler.commands.view.plots import FORMATS, PANEL, STYLE, TALLEST, WIDTH, _undated, plt, prefixed
+from coupler.commands.view.plots import PANEL, STYLE, TALLEST, WIDTH, plt, prefixed
 from coupler.commands.view.study import DASHES
 from coupler.results.history import read_history
 
@@ -41,9 +42,7 @@ def figure(runs, names, stem):
         lines, labels = axes[0, 0].get_legend_handles_labels()
         drawing.legend(lines, labels, loc="outside upper left", ncols=min(3, len(labels)))
         axes[-1, 0].set_xlabel("time [s]")
-        for ending in FORMATS:
-            drawing.savefig(stem.with_suffix(f".{ending}"), metadata=_undated(ending))
-        plt.close(drawing)
+        save(drawing, stem)
     return stem.with_suffix(".png")
 
 

@@ -14,14 +14,15 @@ AVERAGED = (
 )
 
 
-def still(run, folder, size, time=None, **camera):
-    """Write one picture of the stored step nearest to `time` [s] (default: the last); return its path."""
+def stills(run, folder, size, times, **camera):
+    """Write a picture of the stored step nearest to each time [s], None the last step; return their paths."""
     scene = Scene(run, tuple(FINER * pixels for pixels in size), **camera)
-    time = scene.draw(time)
-    path = folder / f"still_{time:.3f}s.png"
-    Image.fromarray(scene.picture()).save(path, dpi=(300, 300), optimize=True)
+    written = []
+    for time in times:
+        written.append(folder / f"still_{scene.draw(time):.3f}s.png")
+        Image.fromarray(scene.picture()).save(written[-1], dpi=(300, 300), optimize=True)
     scene.close()
-    return path
+    return written
 
 
 def film(run, folder, size, fps=20, tell=None, **camera):

@@ -1,12 +1,9 @@
 """Figures of the histories of a run for publication: one file per table, one panel per unit, as vectors and pixels."""
 
-import os
-
-os.environ.setdefault("MPLBACKEND", "agg")
-
 import matplotlib.pyplot as plt
 import numpy as np
 
+from coupler.commands.view.figure_files import FORMATS, save
 from coupler.commands.view.palette import INK, LINES, SOLID
 from coupler.results.history import Column, History, by_block, read_history
 
@@ -21,7 +18,6 @@ FLAT = (
 LEVEL = 0.01
 TALLEST = 8.4  # [inch] of the panels of one figure: with its caption it fits on a page of A4
 ROUND_OFF = 1e-12  # pure numbers below this all the time are not shown
-FORMATS = ("pdf", "svg", "png")
 QUANTITY = {"J": "energy", "N": "force", "Pa": "pressure", "m3": "volume", "m/s": "speed"}
 """Of a panel whose lines have no word in common."""
 UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N m": "N·m", "N s": "N·s", "N m s": "N·m·s"}
@@ -39,9 +35,9 @@ STYLE = {
 }  # fmt: skip
 
 
-def plots(directory, folder):
+def plots(directory, folder, endings=FORMATS):
     """Write the figures of all tables in `directory`/history, but for those of more blocks than a panel has lines;
-    return the paths of the PDF files."""
+    return their paths with the first of the endings."""
     written = []
     for table in sorted((directory / "history").glob("*.csv")):
         history = read_history(table)
@@ -54,7 +50,7 @@ def plots(directory, folder):
             history, panels = of_each_block(history, blocks)
         if panels and len(history["time"]) > 1:
             written += [
-                figure(history, some, folder / (table.stem if leaf == 1 else f"{table.stem}_{leaf}"))
+                figure(history, some, folder / (table.stem if leaf == 1 else f"{table.stem}_{leaf}"), endings)
                 for leaf, some in enumerate(leaves(panels), start=1)
             ]
     return written
@@ -177,8 +173,8 @@ def changed(history, name):
     return values - values[0] if history.title in SINCE_START and unit == "J" and len(values) else values
 
 
-def figure(history, panels, stem):
-    """One figure, a panel under the other over the same time axis; saved in every format under `stem`."""
+def figure(history, panels, stem, endings=FORMATS):
+    """One figure, a panel under the other over the same time axis; its path with the first of the endings."""
     with plt.rc_context(STYLE):
         height = [LOW_PANEL if unit == "1" else PANEL for unit, _ in panels]
         drawing, axes = plt.subplots(
@@ -190,10 +186,8 @@ def figure(history, panels, stem):
         axes[-1, 0].set_xlabel("time [s]")
         drawing.get_layout_engine().execute(drawing)  # once, and not again for every format
         drawing.set_layout_engine("none")
-        for ending in FORMATS:
-            drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
-        plt.close(drawing)
-    return stem.with_suffix(".pdf")
+        save(drawing, stem, endings)
+    return stem.with_suffix(f".{endings[0]}")
 
 
 def panel(axis, history, unit, names):
@@ -254,8 +248,3 @@ def prefixed(unit, largest):
         return 0, UNIT_TEXT.get(unit, unit)
     power = int(np.clip(np.floor(np.log10(largest) / 3), -2, 4))
     return power, PREFIXES[power] + UNIT_TEXT.get(unit, unit)
-
-
-def _undated(ending):
-    """Metadata without a date, so that the same run gives the same file."""
-    return {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)

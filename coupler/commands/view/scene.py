@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap
 
 from coupler.commands.view import palette
 from coupler.commands.view.camera import FAR, angle_of, frame, side_of
-from coupler.commands.view.captions import caption_of, north_of, where_it_happens
+from coupler.commands.view.captions import caption_of, north_of, struck_side, where_it_happens
 from coupler.commands.view.foam import foam
 from coupler.commands.view.scales import bounds, corners, decimals, fastest_and_air, nice_floor
 from coupler.commands.view.section import (
@@ -53,14 +53,14 @@ class Scene:
         foam=False,
     ):
         """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees, azimuth None:
-        the side on which things happen · cut: (axis, place [m]), None for none: what lies before it is left out ·
+        the side that the water strikes · cut: (axis, place [m]), None for none: what lies before it is left out ·
         soft: smooth edges, and darken corners where little light comes (three times the cost of all the rest); without
         it edges are rough, and a picture has to be drawn larger and averaged ·
         letters: times the usual size, for a picture that is shown small · from_inside: from among the blocks, towards
         the azimuth · foam: white where fast water is torn."""
         self.run, self.foam, self.soft = run, foam, soft
         eye = camera_inside(run, azimuth) if from_inside else None
-        azimuth = side_of(where_it_happens(run)) if azimuth is None else azimuth
+        azimuth = side_of(struck_side(run)) if azimuth is None else azimuth
         self.size, self.letters = size, letters
         self.cut = None if cut is None else cut_of(cut, azimuth)
         self.lower, self.upper = bounds(run)

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from matplotlib.colors import to_rgb
 
+from coupler.commands.view.figure_files import save
 from coupler.commands.view.labels import place_labels
 from coupler.commands.view.palette import INK, LINES, SOLID
-from coupler.commands.view.plots import FORMATS, STYLE, _undated, plt
+from coupler.commands.view.plots import STYLE, plt
 
 SIZE = (5.2, 3.5)
 """[inch] one and a half columns of a journal."""
@@ -101,9 +102,7 @@ def figure(stem, q, curves, failed, along):
             drawing.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=6, color=INK)
         crosses(axis, failed)
         place_labels(drawing, axis, labels(shown), 6.5)
-        for ending in FORMATS:
-            drawing.savefig(stem.with_name(f"{stem.name}.{ending}"), metadata=_undated(ending))
-        plt.close(drawing)
+        save(drawing, stem)
     return stem.with_name(f"{stem.name}.png")
 
 

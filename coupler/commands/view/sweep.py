@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.commands.view.figure_files import save
 from coupler.commands.view.palette import INK, LINES, SOLID
-from coupler.commands.view.plots import FORMATS, STYLE, UNIT_TEXT, _undated, plt
+from coupler.commands.view.plots import STYLE, UNIT_TEXT, plt
 from coupler.results.history import read_history
 
 SIZE = (3.4, 2.6)
@@ -64,9 +65,7 @@ def _read(path):
 
 
 def _save(drawing, folder, stem):
-    for ending in FORMATS:
-        drawing.savefig(folder / f"{stem}.{ending}", metadata=_undated(ending))
-    plt.close(drawing)
+    save(drawing, folder / stem)
     return folder / f"{stem}.png"
 
 
