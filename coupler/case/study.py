@@ -42,7 +42,9 @@ class Quantity(Section):
         None, description="from and to when the column counts; absent: the whole run"
     )
     time: Time | None = Field(None, description="when, for take = at")
-    above: Number | None = Field(None, description="value passed, for take = arrival")
+    above: Number | None = Field(
+        None, description="value passed, for take = arrival; between two rows on a line"
+    )
     compared: Literal["peak_force", "dissipated"] | None = Field(
         None, description="the same quantity in `surgebreak compare`, for ladders with laws"
     )

@@ -159,7 +159,9 @@ class SweepQuantity(Section):
     )
     window: tuple[Time, Time] | None = Field(None, description="from and to when it counts; absent: always")
     time: Time | None = Field(None, description="when, for take = at")
-    above: Number | None = Field(None, description="value passed, for take = arrival")
+    above: Number | None = Field(
+        None, description="value passed, for take = arrival; between two rows on a line"
+    )
     damage: Literal["joints", "drift", "drop"] | None = Field(
         None,
         description="joints: share of the joints (of the group) that broke; drift: mean way sideways of the blocks "

@@ -3,7 +3,7 @@
 [[expect]]
 what = "..."           for people                    table, column   of the history
 take = "last"          last | largest (by size, sign kept) | max | min | mean | at (time) | integral (from, to) |
-                       period | arrival (above): first time that the column exceeds a value
+                       period | arrival (above): first time that the column exceeds a value, on a line between two rows
 from, to               of that part of the history alone, whatever is taken; there is no value where the run has not
                        recorded all of it, but for a row at its ends, nor at a time outside of what it recorded
 value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
@@ -139,9 +139,19 @@ def _period(time: Array, values: Array, entry: dict) -> float:
 
 
 def _arrival(time: Array, values: Array, entry: dict) -> float:
-    """First time at which the values exceed entry["above"] [s]; NaN if they never do."""
-    above = values > entry["above"]
-    return time[above.argmax()] if above.any() else np.nan
+    return first_above(time, values, entry["above"])
+
+
+def first_above(time: Array, values: Array, above: float) -> float:
+    """First time at which values (n,) exceed `above` [s], on a line between the row before and the first that does;
+    NaN if they never do."""
+    beyond = values > above
+    if not beyond.any():
+        return np.nan
+    k = int(beyond.argmax())
+    if k == 0 or not np.isfinite(values[k - 1]):
+        return float(time[k])
+    return float(np.interp(above, values[k - 1 : k + 1], time[k - 1 : k + 1]))
 
 
 TAKE: dict[str, Callable[[Array, Array, dict], float]] = {

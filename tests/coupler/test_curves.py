@@ -55,10 +55,10 @@ def test_a_figure_is_drawn_in_three_formats(tmp_path):
 
 
 def test_arrivals_of_a_front():
-    """A front of 1 m/s that passes 0.5, 1.0 and (not within the run) 5 m."""
-    level = np.array([x <= RAMP for x in (0.5, 1.0, 5.0)], float)
-    found = view.arrivals(RAMP, level, 0.5)
-    assert found[:2] == pytest.approx([0.5, 1.0])
+    """A front of 1 m/s that passes 0.503, 1.008 and (not within the run) 5 m, between two rows of the table."""
+    level = np.array([RAMP - x for x in (0.503, 1.008, 5.0)])
+    found = view.arrivals(RAMP, level, 0.0)
+    assert found[:2] == pytest.approx([0.503, 1.008])
     assert np.isnan(found[2])
 
 

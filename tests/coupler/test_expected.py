@@ -6,7 +6,7 @@ import pytest
 from coupler.case.promises import mistakes_in
 from coupler.checks.read_case import load
 from coupler.program.errors import BadCase
-from coupler.results.expected import TAKE, verdicts
+from coupler.results.expected import TAKE, first_above, verdicts
 from coupler.results.history import HistoryTable
 from tests.coupler.test_case_file import WATER
 
@@ -22,12 +22,22 @@ ENTRY = {"time": 1.234, "from": 1.0, "to": 2.5, "above": 6.0}
         ("mean", 5.0 * TIME, 10.0),
         ("at", 2.0 * TIME, 2.468),
         ("integral", 2.0 * TIME, 2.5**2 - 1.0),
-        ("arrival", 5.0 * TIME, 1.21),
+        ("arrival", 5.0 * TIME, 1.2),
         ("period", 7.0 + np.cos(2 * np.pi * TIME / 0.8), 0.8),
     ],
 )
 def test_what_is_taken_from_a_history(take, values, answer):
     assert TAKE[take](TIME, values, ENTRY) == pytest.approx(answer, rel=1e-3)
+
+
+def test_an_arrival_does_not_wait_for_the_next_row():
+    """A gauge that is dry, and at the first row with water far above what is asked for: on a line between the two rows.
+    One that is wet from the start has arrived at its first row, as one whose rows before are empty."""
+    time = np.array([1.0, 2.0, 3.0])
+    assert first_above(time, np.array([0.0, 0.0, 0.4]), 0.1) == pytest.approx(2.25)
+    assert first_above(time, np.array([0.2, 0.3, 0.4]), 0.1) == 1.0
+    assert first_above(time, np.array([np.nan, np.nan, 0.4]), 0.1) == 3.0
+    assert np.isnan(first_above(time, np.array([0.0, 0.05, 0.1]), 0.1))
 
 
 def write_history(folder):

@@ -21,6 +21,7 @@ import numpy as np
 from coupler.case.records import column, find_record, read_record
 from coupler.commands.view.curves import draw
 from coupler.commands.view.figure_files import FORMATS
+from coupler.results.expected import first_above
 from coupler.results.history import read_history
 
 
@@ -78,8 +79,7 @@ def computed(entry, run):
 
 def arrivals(time, values, above):
     """Times (n,) at which the rows of values (n, steps) first exceed `above`; NaN where they never do."""
-    reached = values > above
-    return np.where(reached.any(axis=1), time[reached.argmax(axis=1)], np.nan)
+    return np.array([first_above(time, row, above) for row in values])
 
 
 def reference(entry, place):
