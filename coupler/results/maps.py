@@ -164,6 +164,37 @@ def read_map(path: Path) -> Map:
     return Map(x, y, z, what.rpartition(" [")[0], frame)
 
 
+@dataclass(frozen=True)
+class RunUp:
+    """The highest ground that the water reached and that was dry: z [m] and time of arrival [s] there, x, y [m] in the
+    coordinates of `frame` · area [m²] of all ground that it reached"""
+
+    z: float
+    time: float
+    x: float
+    y: float
+    frame: str
+    area: float
+
+
+def run_up(maps: Path) -> RunUp | None:
+    """Of the maps of a run; None where the water reached no dry ground. Raises as `read_map`."""
+    bed, arrival = read_map(maps / "bed.asc"), read_map(maps / "arrival.asc")
+    reached = np.where(np.isfinite(arrival.z), bed.z, np.nan)
+    if not np.isfinite(reached).any():
+        return None
+    row, column = np.unravel_index(int(np.nanargmax(reached)), reached.shape)
+    of_one = (bed.x[1] - bed.x[0]) * (bed.y[1] - bed.y[0])
+    return RunUp(
+        float(reached[row, column]),
+        float(arrival.z[row, column]),
+        float(bed.x[column]),
+        float(bed.y[row]),
+        bed.frame,
+        float(of_one * np.isfinite(reached).sum()),
+    )
+
+
 def _pairs(nodes: Array, fitted) -> tuple[Array, Array, Array, Array]:
     """Pairs of neighbouring nodes in the columns of the lattice: lower (p,), upper (p,), distance (p,) [m] and number
     of the column (p,). Nodes between the columns, of a mesh that is finer in parts, are left out."""

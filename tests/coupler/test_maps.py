@@ -16,7 +16,7 @@ from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
 from coupler.results.even_raster import even_raster
 from coupler.results.fields import BlockWriter, write_solids
-from coupler.results.maps import NEVER, Maps, read_map
+from coupler.results.maps import NEVER, Maps, read_map, run_up
 from coupler.scene.build_water import water_of
 from tests.coupler.synthetic_run import BOX_FACES, box_vertices
 
@@ -104,6 +104,24 @@ def test_what_was_gathered_goes_into_checkpoints_and_files(flood, tmp_path):
     np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-6, atol=1e-9)
     head = (tmp_path / "maps" / "bed.asc").read_text(encoding="utf-8").split("NODATA_value")[0]
     assert "cellsize 1\n" in head  # not every program knows dx and dy
+
+
+def test_run_up_is_the_highest_ground_that_was_dry_and_got_wet(flood, tmp_path):
+    """The land rises by 0.2 a metre along x from 0 at x = 10 m, and the water stands at 0.3 m; then at 0.9 m."""
+    water, maps = flood
+    maps.step(water, 0.0)
+    maps.write(tmp_path / "maps")
+    assert run_up(tmp_path / "maps") is None
+    with pytest.raises(FileNotFoundError):
+        run_up(tmp_path)
+    water.level_set[:] = water.topology.nodes[:, 2] - 0.9
+    maps.step(water, 0.75)
+    maps.write(tmp_path / "maps")
+    found = run_up(tmp_path / "maps")
+    assert found.time == 0.75
+    assert found.z == pytest.approx(0.9 - maps.film.max(), abs=0.11)
+    assert (found.x - 500.0 - 10.0) * 0.2 == pytest.approx(found.z, abs=0.11)
+    assert found.area == pytest.approx(8.0 * 3.0, rel=0.35)
 
 
 def test_heights_far_above_the_zero_of_the_map_keep_their_millimetres(flood, tmp_path):

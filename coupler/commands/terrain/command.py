@@ -17,6 +17,7 @@ from coupler.geometry.terrain.show import of_file, resolved
 from coupler.program import terminal
 from coupler.program.errors import BadCase
 from coupler.program.process import run_module, trouble
+from coupler.results.maps import run_up
 
 
 def show(place: Path, sets: list[str], picture: Path | None) -> None:
@@ -45,9 +46,10 @@ def _title(run: Path) -> str:
 
 
 def _show_flood(run: Path, picture: Path | None) -> None:
-    """Names of the maps of a run, and all of them in one picture, with the buildings by their state."""
+    """Names of the maps of a run, its run-up, and all of them in one picture, with the buildings by their state."""
     for path in sorted((run / "maps").glob("*.asc")):
         print(path)
+    print(_run_up_in_words(run))
     if picture is not None:
         done = run_module(
             "coupler.commands.view.flood_map", run, picture, _title(run), capture_output=True, text=True
@@ -55,6 +57,21 @@ def _show_flood(run: Path, picture: Path | None) -> None:
         if done.returncode != 0:
             raise TerrainError(f"no map: {trouble(done.returncode, done.stderr)}")
         print(f"map: {picture}")
+
+
+def _run_up_in_words(run: Path) -> str:
+    """How high the water ran up the land. Raises TerrainError of maps that are not what a run writes."""
+    try:
+        found = run_up(run / "maps")
+    except (OSError, ValueError, LookupError) as error:
+        raise TerrainError(f"{run / 'maps'}: not what a run writes: {error}") from error
+    if found is None:
+        return "run-up: the water reached no ground that was dry at the start"
+    return (
+        f"run-up: z = {found.z:.3g} m, the highest ground that the water reached, at ({found.x:.8g}, {found.y:.8g}) in "
+        f"the coordinates of {found.frame}, at t = {found.time:.4g} s; {found.area:.4g} m2 of dry ground were flooded "
+        "(from a tenth of a cell of water on)"
+    )
 
 
 def _of_case(place: Path, sets: list[str]) -> tuple[Path, dict]:
