@@ -5,7 +5,6 @@ exchange                               the exchange between pressure and structu
 passes                                 the passes of a step and their relaxation
 immersion, cracks                      where the structure cuts the water
 pressure_with_structure                the pressure system with the blocks in it
-block_factor                           the factor of the matrix by which the structure answers a load
 coupling_rows                          the matrix G of theory (9), a short row for each node and body
 shear                                  implicit response of blocks to shear
 residual                               the coupling residual, and its history over steps

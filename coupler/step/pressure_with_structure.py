@@ -48,11 +48,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from array_types import Array, Bools, Floats
-from coupler.step.block_factor import BlockFactor
 from coupler.step.coupling_rows import Wetting
-from kernels.decorators import kernel
+from kernels.decorators import kernel, plain
 
 if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem
@@ -110,11 +110,27 @@ class StructureResponse:
         for part in (damping, dt * stiffness, self._restoring):
             if part is not None and part.nnz:
                 self.matrix = self.matrix + part
-        self._factor = BlockFactor.of(sp.csr_array(self.matrix), ~driven)
+        own, tied = _own_blocks(self.matrix.indptr, self.matrix.indices, self.matrix.data, len(driven))
+        tied &= ~driven
+        self._alone = np.flatnonzero(~driven & ~tied)
+        self._inverse = np.linalg.inv(own[self._alone])
+        self._tied = np.flatnonzero(np.repeat(tied, 6))
+        self._factor = None
+        if len(self._tied):
+            block = self.matrix[self._tied][:, self._tied]
+            self._factor = splu(
+                sp.csc_matrix(block), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+            )
 
     def compliance(self, force: Array) -> Array:
-        """D⁻¹ force over the free bodies, zero on the driven ones. force (6n,) [N, N m] → (6n,) [m/s, rad/s]"""
-        return self._factor.solve(force)
+        """D⁻¹ force over the free bodies, zero on the driven ones. force (6n,) [N, N m] → (6n,) [m/s, rad/s]
+
+        Bodies without joints or contacts are solved one by one."""
+        velocity = np.zeros_like(force)
+        _answer(self._alone, self._inverse, force, velocity)
+        if self._factor is not None:
+            velocity[self._tied] = self._factor.solve(np.ascontiguousarray(force[self._tied]))
+        return velocity
 
     def velocity(self, force: Array) -> Array:
         """Solve D V = force with the driven bodies at their imposed velocity. (6n,) → (6n,)"""
@@ -138,7 +154,9 @@ class StructureResponse:
         free[self.free // 6] = True
         bodies = np.flatnonzero(free & force.any(axis=1))
         if len(bodies):
-            inertia = _own_blocks(self._held.indptr, self._held.indices, self._held.data, bodies)
+            inertia = _own_blocks(self._held.indptr, self._held.indices, self._held.data, len(share))[0][
+                bodies
+            ]
             answer = self.compliance(force.ravel()).reshape(-1, 6)[bodies]
             loose = np.linalg.solve(inertia, force[bodies][:, :, None])[:, :, 0]
             moved, whole = (np.einsum("ni,nij,nj->n", v, inertia, v) for v in (answer, loose))
@@ -184,16 +202,29 @@ def _of_heave(blocks: Array, mass: Array) -> sp.csr_array:
 
 
 @kernel
-def _own_blocks(indptr: Array, indices: Array, data: Array, bodies: Array) -> Array:
-    """Diagonal blocks (k, 6, 6) of a csr matrix (6n, 6n) for the listed bodies (k,)."""
-    blocks = np.zeros((len(bodies), 6, 6))
+def _own_blocks(indptr: Array, indices: Array, data: Array, n: int) -> tuple[Array, Array]:
+    """Diagonal blocks (n, 6, 6) of a csr matrix (6n, 6n), and (n,) bool: bodies with entries in the rows of others."""
+    blocks, tied = np.zeros((n, 6, 6)), np.zeros(n, np.bool_)
+    for row in range(6 * n):
+        for s in range(indptr[row], indptr[row + 1]):
+            column = indices[s]
+            if column // 6 == row // 6:
+                blocks[row // 6, row % 6, column % 6] += data[s]
+            elif data[s] != 0.0:
+                tied[row // 6] = tied[column // 6] = True
+    return blocks, tied
+
+
+@plain
+def _answer(bodies: Array, inverse: Array, force: Array, velocity: Array) -> None:
+    """Rows of `bodies` (k,) of velocity (6n,) from force (6n,) and inverse (k, 6, 6), in place."""
     for k in range(len(bodies)):
-        for r in range(6):
-            row = 6 * bodies[k] + r
-            for s in range(indptr[row], indptr[row + 1]):
-                if indices[s] // 6 == bodies[k]:
-                    blocks[k, r, indices[s] % 6] += data[s]
-    return blocks
+        first = 6 * bodies[k]
+        for i in range(6):
+            total = 0.0
+            for j in range(6):
+                total += inverse[k, i, j] * force[first + j]
+            velocity[first + i] = total
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -301,6 +301,26 @@ def test_a_force_is_held_as_far_as_a_body_does_not_give_way_to_it():
     np.testing.assert_allclose(response.held(force)[:, 0], [0.0, 1.0 / 3.0, 1.0, 0.0], atol=1e-12)
 
 
+def test_tied_loose_and_held_bodies_answer_a_force_by_their_own_equations():
+    """Bodies 0, 1, 2 in a chain of springs far stiffer than they are heavy, 3 tied to 4, which is held, 5 loose: what
+    is left of each row of a free body is round-off of its products, and 4 does not move."""
+    rng, n, stiffness = np.random.default_rng(3), 6, np.zeros((36, 36))
+    for a, b in ((2, 0), (0, 1), (3, 4)):
+        spring = np.zeros((6, 36))
+        spring[:, 6 * a : 6 * a + 6], spring[:, 6 * b : 6 * b + 6] = rng.normal(size=(2, 6, 6))
+        stiffness += 1e6 * spring.T @ spring
+    driven, force = np.arange(n) == 4, rng.normal(size=6 * n)
+    M = mass_matrix(rng.uniform(1.0, 3.0, n), np.tile(np.eye(3), (n, 1, 1)))
+    response = StructureResponse(
+        M, sp.csr_array(stiffness), sp.csr_array((36, 36)), 0.1, driven, np.zeros((n, 6))
+    )
+    found, free = response.compliance(force), np.repeat(~driven, 6)
+    matrix = (M / 0.1).toarray() + 0.1 * stiffness
+    size = np.abs(matrix) @ np.abs(found) + np.abs(force)
+    assert (np.abs(matrix @ found - force) <= 1e-13 * size)[free].all()
+    assert (found[~free] == 0.0).all()
+
+
 def test_defect_of_a_body_that_stood_still_is_whole():
     """The larger of what was found and what was assumed is the measure: neither alone may vanish."""
     M = mass_matrix(np.array([2.0]), np.eye(3)[None])
