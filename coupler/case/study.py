@@ -208,7 +208,9 @@ class Study(Section):
     )
     repeat: Count = Field(1, description="times that each run is made; its cost is that of the cheapest one")
     cpu_seconds: PositiveTime = Field(
-        3600.0, description="processor time after which a run is given up and reported as failed"
+        3600.0,
+        description="processor time after which a run is given up and reported as failed; takes the place of "
+        "limits.cpu_seconds",
     )
     quantity: tuple[Quantity, ...] = Field(min_length=1, description="what is measured")
     ladder: tuple[Ladder, ...] = Field(min_length=1, description="what is varied")

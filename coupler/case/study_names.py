@@ -16,11 +16,35 @@ def without_places(name: str) -> tuple[str, ...]:
     return tuple(part.partition("[")[0] for part in name.split("."))
 
 
+def limit_problem(name: str, section: str) -> str:
+    """Why a run of a study or a sweep (section) cannot have a limit of processor time of its own; empty for any other
+    name of the case."""
+    if name.strip() != "limits.cpu_seconds":
+        return ""
+    return (
+        f"'limits.cpu_seconds': {section}.cpu_seconds takes its place in every run of a {section}; write that"
+    )
+
+
+def limit_in_overrides(
+    overrides: Iterable[str], path: KeyPath, section: str
+) -> Iterator[tuple[KeyPath, str]]:
+    """The same of changes KEY=VALUE at a key path of the case."""
+    for override in overrides:
+        wrong = limit_problem(override.partition("=")[0], section)
+        if wrong:
+            yield path, wrong
+
+
 def study_problems(study: Study) -> Iterator[tuple[KeyPath, str]]:
     """(key path, message) of names in [study] that do not exist."""
     yield from _taken("quantity", study.quantity)
     yield from _taken("ladder", study.ladder)
     yield from _taken("off", study.off)
+    yield from limit_in_overrides(study.set, ("study", "set"), "study")
+    for kind in ("ladder", "off"):
+        for i, one in enumerate(getattr(study, kind)):
+            yield from limit_in_overrides(one.set, ("study", kind, i, "set"), "study")
     ladders = [ladder.name for ladder in study.ladder]
     for i, ladder in enumerate(study.ladder):
         yield from _ladder_names(ladder, ("study", "ladder", i), study)
@@ -53,6 +77,9 @@ def _ladder_names(ladder: Ladder, path: tuple, study: Study) -> Iterator[tuple[K
                 (*path, "key"),
                 f"'{name}': no such name in a case file{did_you_mean(plain, known)}",
             )
+        wrong = limit_problem(plain, "study")
+        if wrong:
+            yield (*path, "key"), wrong
     across = {other.name for other in study.ladder if other.key} - {ladder.name}
     if ladder.across is not None and ladder.across not in across:
         yield (

@@ -258,7 +258,9 @@ class Sweep(Section):
         (), description="changes of all runs of the sweep, KEY=VALUE", examples=[["time.end=1 s"]]
     )
     cpu_seconds: PositiveTime = Field(
-        3600.0, description="processor time after which a run is given up and reported as failed"
+        3600.0,
+        description="processor time after which a run is given up and reported as failed; takes the place of "
+        "limits.cpu_seconds",
     )
     table: str | None = Field(
         None,

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from coupler.case.formula import BadFormula, names_used
 from coupler.case.keys import keys
-from coupler.case.study_names import without_places
+from coupler.case.study_names import limit_in_overrides, limit_problem, without_places
 from coupler.case.sweep import PARAMETERS, Sweep, Varied
 from coupler.case.types import KeyPath, Problem
 from coupler.case.units import DIMENSIONS, to_si
@@ -34,6 +34,7 @@ PLAIN = {
 def sweep_problems(sweep: Sweep) -> Iterator[Problem]:
     """(key path, message) of every name in [sweep] that does not exist, or is used twice."""
     yield from _keys(sweep)
+    yield from limit_in_overrides(sweep.set, ("sweep", "set"), "sweep")
     yield from _amounts(sweep)
     yield from _columns(sweep)
     yield from _formulas(sweep)
@@ -83,7 +84,7 @@ def key_problem(name: str) -> str:
         return f"'{name}': no such name in a case file{did_you_mean(plain, known)}"
     if plain.partition(".")[0] in ("study", "sweep"):
         return f"'{name}': a run takes no notice of [{plain.partition('.')[0]}]"
-    return ""
+    return limit_problem(plain, "sweep")
 
 
 @lru_cache(maxsize=1)

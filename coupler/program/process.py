@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +30,11 @@ LAST_LINES = 3
 
 
 def run_module(module: str, *words: object, **options: Any) -> subprocess.CompletedProcess:
-    """`python -m module words...` of this very program; options of subprocess.run, of which check is False."""
+    """`python -m module words...` of this very program, which ends with this process; options of subprocess.run, of
+    which check is False."""
     command = [sys.executable, "-m", module, *map(str, words)]
-    return subprocess.run(command, **{"check": False, "env": environment(), **options})
+    ours = {"check": False, "env": environment(), "preexec_fn": partial(end_with, os.getpid())}
+    return subprocess.run(command, **{**ours, **options})
 
 
 def end_with(parent: int) -> None:

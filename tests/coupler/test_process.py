@@ -4,12 +4,15 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from coupler.commands.benchmark import command
 from coupler.program import extras, process, provenance
 from coupler.program.provenance import ROOT
+
+from .until import until
 
 HERE = "print(__file__)\n"
 
@@ -47,6 +50,50 @@ def test_children_are_of_the_checkout_of_their_parent(tmp_path):
         [sys.executable, "-c", code], cwd=other, env=parent, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == str(mine / "coupler" / "here.py")
+
+
+ASLEEP = "import os, time; open({place!r}, 'w').write(f'{{os.getpid()}}\\n'); time.sleep(300)"
+"""A child that says which process it is and then takes long."""
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "from coupler.program.process import run_module\nrun_module('timeit', '-n1', '-r1', {child!r})",
+        """
+import sys
+from pathlib import Path
+from coupler.commands.sweep import local
+class Spec: folder, threads = Path({folder!r}), 1
+real = local.subprocess.Popen
+local.subprocess.Popen = lambda words, **options: real([sys.executable, "-c", {child!r}], **options)
+local.Local(Spec, 1).make(["a"], print)
+""",
+    ],
+    ids=["a step of a command", "a run of a sweep"],
+)
+def test_a_child_ends_with_the_command_that_was_killed(tmp_path, start):
+    """Else what nobody waits for any more goes on for hours, after `kill` and after the terminal was closed."""
+    (tmp_path / "runs").mkdir()
+    place = tmp_path / "child"
+    code = start.format(child=ASLEEP.format(place=str(place)), folder=str(tmp_path))
+    parent = subprocess.Popen([sys.executable, "-c", code], env=process.environment())
+    try:
+        until(lambda: place.exists() and place.read_text().endswith("\n"), "the child begins", 60.0)
+        child = int(place.read_text())
+    finally:
+        parent.kill()
+        parent.wait()
+    until(lambda: not _lives(child), "the child ends", 20.0)
+
+
+def _lives(number):
+    """Whether a process is there and has not ended; one whose parent has not asked for its end is a zombie (Z)."""
+    try:
+        state = Path(f"/proc/{number}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
 
 
 def test_the_path_that_the_user_gave_stays_behind_ours(monkeypatch):

@@ -40,6 +40,12 @@ def messages(tmp_path, text):
         ('name = "rule"', 'name = "rule"\nlabels = ["a"]', "1 labels for 2 values"),
         ('name = "rule"', 'name = "rule"\nlaws = ["cpm"]', "laws and substeps go together"),
         ('set = ["contact.friction=0"]', 'set = ["contact.friction"]', "contact.friction"),
+        (
+            'set = ["contact.friction=0"]',
+            'set = ["limits.cpu_seconds=6"]',
+            "study.cpu_seconds takes its place",
+        ),
+        ('key = "time.step_max"', 'key = "limits.cpu_seconds"', "study.cpu_seconds takes its place"),
     ],
 )
 def test_mistakes_in_a_study_are_reported_with_a_way_out(tmp_path, old, new, says):

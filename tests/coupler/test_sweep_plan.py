@@ -407,6 +407,8 @@ def test_nothing_varied_is_refused(case):
     ("sweep", "says"),
     [
         ('[[sweep.vary]]\nkey = "joints.strenght"\nvalues = [1]', "did you mean 'joints.strength'"),
+        ('[[sweep.vary]]\nkey = "limits.cpu_seconds"\nvalues = [1, 2]', "sweep.cpu_seconds takes its place"),
+        ('[sweep]\nset = ["limits.cpu_seconds=9"]', "sweep.cpu_seconds takes its place"),
         ('[[sweep.vary]]\nkey = "joints.strength"\nvaluse = [1]', "did you mean 'values'"),
         ('[[sweep.vary]]\nkey = "joints.strength"', "give one of values, steps"),
         ('[[sweep.vary]]\nkey = "joints.strength"\nvalues = [1]\nsteps = 2', "give one of values, steps"),

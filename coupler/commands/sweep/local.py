@@ -9,9 +9,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterable
+from functools import partial
 
 from coupler.commands.sweep.folder import Spec
-from coupler.program.process import environment
+from coupler.program.process import end_with, environment
 from coupler.program.threads import VARIABLE, cores
 
 Tell = Callable[[dict], None]
@@ -88,7 +89,8 @@ class Local:
             self.done.put(None)
 
     def _start(self, cold: bool) -> subprocess.Popen:
-        """A worker in a session of its own: Ctrl-C of the terminal reaches it through `stop` alone."""
+        """A worker in a session of its own: Ctrl-C of the terminal reaches it through `stop` alone. If this process is
+        killed, the worker lets its run write a checkpoint and end, as `stop` does."""
         log = (self.spec.folder / "runs" / "worker.log").open("a", encoding="utf-8")
         words = [sys.executable, "-m", "coupler.commands.sweep_worker", str(self.spec.folder)]
         variables = environment() | {VARIABLE: str(self.spec.threads)}
@@ -101,6 +103,7 @@ class Local:
                 env=variables,
                 text=True,
                 start_new_session=True,
+                preexec_fn=partial(end_with, os.getpid()),
             )
         self.workers.append(worker)
         return worker
