@@ -57,16 +57,15 @@ def _pieces(structure: Structure) -> Array:
 
 def _turning_back(structure: Structure, label: Array, pieces: Array, reach: Array) -> Array:
     """(p,) bool: which of the `pieces` (p,) bool have a corner of their base in its place, and their centre of mass,
-    which has risen, before the last of those. label (n,): piece of each block."""
+    which has risen, before the last of those. label (n,): piece of each block; none of `pieces` holds a held block."""
     up, centre, rotation = _up(structure), structure.centre(), structure.rotation()
     start = np.array([block.centre for block in structure.blocks])
-    mass = np.where(structure.fixed, 0.0, structure.mass)
-    mean, way = _means(label, mass, centre), _means(label, mass, centre - start)
+    mean, way = (_means(label, structure.mass, x) for x in (centre, centre - start))
     along = way - (way @ up)[:, None] * up
     size = np.linalg.norm(along, axis=1)
     along /= np.where(size > 0.0, size, 1.0)[:, None]
     looked_at = pieces & (way @ up > 0.0) & (size > 0.0)
-    rows = np.flatnonzero(looked_at[label] & ~structure.fixed)
+    rows = np.flatnonzero(looked_at[label])
     if not len(rows):
         return looked_at
     before = np.concatenate([structure.blocks[i].world_vertices() for i in rows])

@@ -15,6 +15,7 @@ from coupler.verdict.attitude import tilt_of
 from coupler.verdict.damage import Rules, state_of
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import _largest, places_of, verdict
+from coupler.verdict.rocking import rocking
 from coupler.verdict.watch import Peaks
 from coupler.verdict.words import _loads, _of_bodies, sentences, unreached
 from tests.coupler.resumed import DRY, begin
@@ -251,6 +252,18 @@ def test_a_block_that_is_driven_does_not_rock(scene):
     watch.step(coupling, record(0.4))
     found = verdict(s, watch)["displaced"]
     assert found == dict.fromkeys(found, 0) | {"first": None, "list": []}
+
+
+def test_blocks_on_a_held_one_rock_each_by_itself(scene):
+    """Crate and upper block are joined to the lower one, which is held: that one falls does not keep the other, whose
+    centre is before its toe, from coming back."""
+    s, table = scene[0], scene[0].joint_table()
+    table.a, table.b = np.array([2, 1]), np.array([0, 0])
+    s.joint_table = lambda: table
+    s.fixed[0] = True
+    tilted(s, 0.3, rows=(2,), toe=(3.5, 0.0, 0.0))
+    s.x = s.x - np.array([[0, 0, 0], [0, 0, 0.5], [0, 0, 0]])
+    assert rocking(s, np.array([False, True, True]), np.full(3, 0.1)).tolist() == [False, False, True]
 
 
 def test_a_block_that_lost_a_support_does_not_rock(scene):

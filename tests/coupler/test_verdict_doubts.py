@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from coupler.verdict.judge import verdict
+from coupler.verdict.trend import Trend
 from coupler.verdict.words import sentences, still_rising, unsettled
 from tests.coupler.verdict_scene import record, verdict_scene
 
@@ -92,3 +93,13 @@ def test_loose_blocks_beside_a_structure_with_joints_are_named(scene):
     found = verdict(s, watch)
     assert found["state"] == "stands"
     assert f"not judged: crate (moved){last}" in list(sentences(found))
+
+
+def test_the_means_of_a_load_that_does_not_change_are_that_load():
+    """From the first step on, however long steps are: a mean that began below it would call the load rising."""
+    trend, time = Trend.none(), 0.0
+    for dt in (0.02, 0.001, 0.05, 0.3, 2.0):
+        time += dt
+        trend.take(np.array([3e4, 5e4]), time, dt)
+        assert trend.array() == pytest.approx(np.tile([3e4, 5e4], (3, 1)), rel=1e-12)
+        assert trend.rising() is None
