@@ -260,6 +260,10 @@ class ContactForces:
 
     def add_forces(self, dt: float, F: Array) -> None:
         """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
+        self._read = None
+        if not len(self._pairs.a):  # those of a building whose joints all hold
+            self._count = 0
+            return
         m = self._motion
         state = Kinematics(m.all_x, m.all_v, m.all_R, dt, m.dt)
         self._count, lost = contact_forces(
@@ -267,7 +271,6 @@ class ContactForces:
             self._rows, F,
         )  # fmt: skip
         self.friction += lost
-        self._read = None
 
     def now_on_blocks(self) -> Array:
         """Forces of the contacts at the present positions, (n, 6) [N, N m]."""
@@ -278,9 +281,10 @@ class ContactForces:
     def settle(self, dt: float) -> None:
         """Account for the work of the contacts over the substep that has just ended, and search for neighbours if it is
         due."""
-        dashpot, driving = contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
-        self.dashpot += dashpot
-        self.driving += driving
+        if self._count:
+            dashpot, driving = contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
+            self.dashpot += dashpot
+            self.driving += driving
         self._moved += dt * fastest(self._motion.v, self._shapes.radius)
         if self._moved > self._reach:
             self.search()
