@@ -38,7 +38,8 @@ class Output(NamedTuple):
     open_start: Ints  # (open polygons + 1,)
     open_x: Floats  # (corners, 3)
     tet_part: Ints  # (tetrahedra,) row of the part that they fill
-    tet: Floats  # (tetrahedra, 17) volume, barycentric coordinates of the four corners
+    tet_volume: Floats  # (tetrahedra,)
+    tet_corners: Floats  # (tetrahedra, 16) barycentric coordinates of the four corners
 
 
 def output(cells: int, with_openings: bool) -> Output:
@@ -58,7 +59,8 @@ def output(cells: int, with_openings: bool) -> Output:
         open_start=np.empty(openings + 1, dtype=np.int64),
         open_x=np.empty((corners, 3)),
         tet_part=np.empty(tetrahedra, dtype=np.int64),
-        tet=np.empty((tetrahedra, 17)),
+        tet_volume=np.empty(tetrahedra),
+        tet_corners=np.empty((tetrahedra, 16)),
     )
     out.open_start[0] = 0
     return out
@@ -72,8 +74,8 @@ class Cuts(NamedTuple):
     3 corners
     open_part (O,), open_face (O,) 0..3 (opposite to node k), open_start (O+1,), open_x [m]: the faces of
     the parts on the faces of their cells (only with connected parts).
-    tet_part (T,) row of the part · tet (T, 17) tetrahedra that fill it: volume [m3], barycentric coordinates of the
-    four corners in the cell (only of parts that are not whole cells)"""
+    tet_part (T,) row of the part · tet_volume (T,) [m3], tet_corners (T, 16): of the tetrahedra that fill it, the
+    latter barycentric coordinates of the four corners in the cell (only of parts that are not whole cells)"""
 
     part_cell: Ints
     part_whole: Bools
@@ -86,7 +88,8 @@ class Cuts(NamedTuple):
     open_start: Ints
     open_x: Floats
     tet_part: Ints
-    tet: Floats
+    tet_volume: Floats
+    tet_corners: Floats
 
     def kept(self, keep) -> Cuts:
         """Only the parts keep (K,) bool, with their polygons."""
@@ -105,7 +108,8 @@ class Cuts(NamedTuple):
             open_start=np.concatenate([[0], np.cumsum(length[openings])]).astype(np.int64),
             open_x=self.open_x[np.repeat(openings, length)],
             tet_part=row[self.tet_part[filled]],
-            tet=self.tet[filled],
+            tet_volume=self.tet_volume[filled],
+            tet_corners=self.tet_corners[filled],
         )
 
 
@@ -140,7 +144,7 @@ def _filled(out, at) -> tuple[int, ...]:
     """Rows of each array of the output that were filled."""
     parts, wet, openings, tets = (int(n) for n in at[1:])
     corners = int(out.open_start[openings])
-    return (*(parts,) * 3, *(wet,) * 3, *(openings,) * 2, openings + 1, corners, *(tets,) * 2)
+    return (*(parts,) * 3, *(wet,) * 3, *(openings,) * 2, openings + 1, corners, *(tets,) * 3)
 
 
 def trimmed(out, at) -> Cuts:

@@ -307,10 +307,14 @@ def _emit(cut, cell, origin, count, n_near, whole, link_area, at):
         merge_moments(out.part_moments[part], w.moments)
         if link_area >= 0.0:
             state, n_open = _openings(w, piece, origin, part, out, n_open)
-        if state == DONE and not whole:
-            state, n_tet = fan(w, piece, part, out, n_tet)
         if state != DONE:
             return state
+    for part in range(0 if whole else parts):  # in their order, so that `fans` need not sort them
+        for piece in range(count):
+            if w.label[piece] == part:
+                state, n_tet = fan(w, piece, n_part + part, out, n_tet)
+                if state != DONE:
+                    return state
     state, n_wet = claim_rest(cut, count, n_near, n_part, origin, n_wet)
     if state != DONE:
         return state

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluid.cut.cut_arrays import Cuts
 from fluid.cut.pieces import DONE, OUTPUT_FULL, has_vertex
 from kernels.decorators import inner, kernel
 
@@ -35,24 +36,27 @@ def fan(w, piece, part, out, n):
             if n >= len(out.tet_part):
                 return OUTPUT_FULL, n
             out.tet_part[n] = part
-            out.tet[n, 0] = v
+            out.tet_volume[n] = v
             for j in range(4):
-                out.tet[n, 1 + j] = w.x[o, j]
-                out.tet[n, 5 + j] = w.x[a, j]
-                out.tet[n, 9 + j] = w.x[b, j]
-                out.tet[n, 13 + j] = w.x[c, j]
+                out.tet_corners[n, j] = w.x[o, j]
+                out.tet_corners[n, 4 + j] = w.x[a, j]
+                out.tet_corners[n, 8 + j] = w.x[b, j]
+                out.tet_corners[n, 12 + j] = w.x[c, j]
             n += 1
     return DONE, n
 
 
-def fans(tet_part, tet, element_of_part, n_elements: int):
-    """The tetrahedra (T, 17) of cut parts tet_part (T,) in the order of their elements element_of_part (K,); -1: the
-    part was dropped.
+def fans(cuts: Cuts, element_of_part, n_elements: int):
+    """The tetrahedra of cut parts in the order of their elements element_of_part (K,); -1: the part was dropped.
 
     -> start (n_elements + 1,), none in whole cells · volume (T,) [m³] · corners (T, 4, 4), the barycentric coordinates
-    of the four corners in their cell."""
-    start, order = _sorted(element_of_part[tet_part], n_elements)
-    return start, *_rows(tet, order)
+    of the four corners in their cell. Where no part was dropped they are those of `cuts`, not copied, since parts and
+    elements follow one another alike."""
+    start, order, in_order = _sorted(element_of_part[cuts.tet_part], n_elements)
+    volume, corners = cuts.tet_volume, cuts.tet_corners
+    if not in_order:
+        volume, corners = volume[order], corners[order]
+    return start, volume, corners.reshape(-1, 4, 4)
 
 
 def tetrahedra_of(start, elements):
@@ -65,24 +69,13 @@ def tetrahedra_of(start, elements):
 
 
 @kernel
-def _rows(tet, order):
-    """Volumes (n,) and corners (n, 4, 4) of the tetrahedra `order` (n,)."""
-    volume, corners = np.empty(len(order)), np.empty((len(order), 4, 4))
-    for t in range(len(order)):
-        row = tet[order[t]]
-        volume[t] = row[0]
-        for j in range(4):
-            for k in range(4):
-                corners[t, j, k] = row[1 + 4 * j + k]
-    return volume, corners
-
-
-@kernel
 def _sorted(element, n_elements):
-    """start (n_elements + 1,), and the indices that sort the entries (T,) of `element`; negative entries are left
-    out."""
-    start = np.zeros(n_elements + 1, np.int32)
+    """start (n_elements + 1,), the indices that sort the entries (T,) of `element`, without the negative ones, and
+    whether these are all entries in their order."""
+    start, last, in_order = np.zeros(n_elements + 1, np.int32), 0, True
     for t in range(len(element)):
+        in_order = in_order and element[t] >= last
+        last = element[t]
         if element[t] >= 0:
             start[element[t] + 1] += 1
     for e in range(n_elements):
@@ -92,4 +85,4 @@ def _sorted(element, n_elements):
         if element[t] >= 0:
             order[filled[element[t]]] = t
             filled[element[t]] += 1
-    return start, order
+    return start, order, in_order

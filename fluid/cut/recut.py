@@ -29,7 +29,8 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
         open_start=start,
         open_x=_rows(corner, old.open_x, new.open_x),
         tet_part=_rows(tets, kept[old.tet_part], fresh[new.tet_part]),
-        tet=_rows(tets, old.tet, new.tet),
+        tet_volume=_rows(tets, old.tet_volume, new.tet_volume),
+        tet_corners=_rows(tets, old.tet_corners, new.tet_corners),
     )
 
 

@@ -359,7 +359,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         face_cell, wet, wet_body = renumbered[face_cell[left]], wet[left], wet_body[left]
         of_part = np.where(keep[of_part], renumbered[of_part], -1)
         parent, part, volume = parent[keep], part[keep], volume[keep]
-    fan_start, fan_volume, fan_corners = fans(cuts.tet_part, cuts.tet, of_part, len(parent))
+    fan_start, fan_volume, fan_corners = fans(cuts, of_part, len(parent))
     return PhysicalDomain(
         nodes=mesh.nodes if covers == "single" else mesh.nodes[parent_node],
         cells=cells,
