@@ -33,7 +33,7 @@ from kernels.decorators import inner, kernel
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
 """Longest over shortest edge of a cell, 1.73 in a split cube, up to which volume passes through borders upright on its
-edges."""
+edges on meshes with obtuse cells."""
 SAME_SIZE = 1e-9
 """Difference of sizes over the spacing that counts as round-off."""
 IN_PLANE, ROUND_OFF = 1e-10, 16.0 * float(np.finfo(float).eps)
@@ -216,8 +216,10 @@ class Background:
 
     @cached_property
     def upright(self) -> Array:
-        """(M,) bool: cells in which volume passes through borders upright on the edges (`volume.py`): neither obtuse
-        nor slender."""
+        """(M,) bool: cells in which volume passes through borders upright on the edges (`volume.py`): on meshes
+        without obtuse cells all, on others those that are neither obtuse nor slender."""
+        if not self.is_obtuse:
+            return np.ones(len(self.cells), bool)
         return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
 
     @cached_property

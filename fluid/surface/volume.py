@@ -7,12 +7,14 @@ before is carried by the fluxes of the projected velocity u_e, which balance exa
     q_ij = -Σ_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,              (1)
 
 along the edges (`volume_transport.py`): what goes through the cell borders that stand upright on the edge, half way;
-in split bricks along the sides of the bricks only. A cell with an obtuse dihedral angle, where this may run against the
-water, or with edges that differ by more than 2.5 times gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its
-medians: in cells three times as high as wide a dam break gains 1.1 % of its energy with it, 3.5 % with (1).  In split
-cubes that sends a third of the flow across, along diagonals and back along sides, and where the surface slopes less
-comes back than goes: a dam break in a tank 0.5 m wide ran 7 cm farther along one side than along the other, on any
-cells.
+in split bricks along the sides of the bricks only, whatever the lengths of these. A cell with an obtuse dihedral angle,
+where this may run against the water, gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its medians, and so do, on
+meshes with such cells, those with edges that differ by more than 2.5 times (`Background.upright`). In split bricks
+that sends a third of the flow across, along diagonals and back along sides. Where the surface slopes less comes back
+than goes: a dam break in a tank 0.5 m wide ran 7 cm farther along one side than along the other, on any cells. In flat
+bricks the diagonals exchange water, and with it momentum, between the layers, so that the slow layer on a rough bed is
+mixed with the stream above it; in tall ones a tenth to a third of the water had to be brought back by the last shift in
+a dam break, a twentieth at most with (1).
 
 Then φ takes the shift ψ that brings its own volume there,
 
