@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coupler.case.case import Stretch
 from coupler.commands.verify import courant
 from coupler.commands.verify.curves import Curve, Figure, Panel
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.losses import Losses
 from coupler.commands.verify.registry import TOLD, Finding, check
 from coupler.commands.verify.scenes import DENSITY, G, box, column, slice_sides, tank, top
+from coupler.geometry.stretches import graded
 from fluid.mesh.refinement import InBox
 from fluid.readings import gauges
 
@@ -28,7 +30,9 @@ PLATEAU = (3.5, 4.5)
 WINDOW = 0.5
 """t* over which the mean of an impact is taken, 87 ms."""
 BED = 0.125
-"""Height [H] of the cells on the bed that are halved: two layers of H/16."""
+"""Height [H] of the smaller cells on the bed: two layers of H/16."""
+FLAT = ((16, 64), (24, 48), (32, 64))
+"""H over the sides of the cells, and over the height of those on the bed."""
 
 
 @dataclass(frozen=True)
@@ -63,22 +67,24 @@ def wall_impact():
         bed = [InBox((-1.0, -1.0, -1.0), (3.0, 1.0, BED * DEPTH), levels)]
         run = _impact(16, width=1, until=TO + 0.1, refined=bed, **RUBBED)
         yield from _impact_findings(f"cells H/16, H/{size} on the bed: ", run, table, f" {TOLD}")
+    sph = columns("decourcy_p2_sph")
+    shown = {f"H/{n}": run for n, run in runs.items()}
+    for n, size in FLAT:
+        run = _impact(n, width=1, until=TO + 0.1, flat=size, **RUBBED)
+        shown[f"H/{n}, on the bed H/{size} high"] = run
+        where = f"cells H/{n}, on the bed H/{size} high: "
+        yield from _impact_findings(where, run, table, f" {TOLD}")
+        yield _against_sph(where, _impact(n, width=1, until=TO + 0.1, flat=size), sph, ANY, f" {TOLD}")
     measured = _measured_plateaus(table)
     runs_and_finest = runs | {64: _impact(64, width=1, until=PLATEAU[1] + 0.1, **RUBBED)}
     for n, run in runs_and_finest.items():
         for sensor, height in enumerate(SENSORS):
             what = f"cells H/{n}: mean p* at {1e3 * height:g} mm, {PLATEAU[0]} < t* < {PLATEAU[1]} {TOLD}"
             yield Finding(what, run.mean(sensor), measured[sensor], ANY, False)
-    sph = columns("decourcy_p2_sph")
-    at = np.linspace(3.0, 6.0, 301)
-    differs = slipping.within(at, 1) - np.interp(at, sph["tstar"], sph["pstar"])
-    rms = np.sqrt(np.mean(differs**2))
-    yield Finding(
-        "free-slip walls: rms difference of p* to published δ-SPH, 3 < t* < 6", rms, 0.0, 0.05, False
-    )
+    yield _against_sph("", slipping, sph, 0.05)
     yield from slipping.losses.findings("free-slip walls: ")
     yield _impact_figure(runs[32], slipping, table, sph)
-    yield _cells_figure(runs, table)
+    yield _cells_figure(shown, table)
     steps = {number: _impact(16, courant=number) for number in courant.NUMBERS if number != 1.0} | {
         1.0: slipping
     }
@@ -95,12 +101,12 @@ def _measured_plateaus(table) -> list[float]:
     return [float(np.mean(np.interp(at, curve["tstar"], curve[name]))) for curve, name in curves]
 
 
-def _cells_figure(runs: dict[int, Impact], table) -> Figure:
-    """Figure of the pressure at sensor 2 for different cell sizes, with wall friction."""
+def _cells_figure(runs: dict[str, Impact], table) -> Figure:
+    """Figure of the pressure at sensor 2 on different cells, by their name, with wall friction."""
     some = slice(None, None, 10)
     t = table["tstar"][some]
     curves = [Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some])]
-    curves += [Curve(f"smooth walls, H/{n}", "computed", run.t, run.p[:, 1]) for n, run in runs.items()]
+    curves += [Curve(f"smooth walls, {name}", "computed", run.t, run.p[:, 1]) for name, run in runs.items()]
     return Figure("P38_cells", (Panel(*P_AXES, tuple(curves), (2.2, 6.6), (-0.1, 3.0)),))
 
 
@@ -125,11 +131,24 @@ def _impact_findings(where: str, run: Impact, table, told: str = ""):
     yield Finding(what, inside, 1.0, ANY if told else 0.2, False)
 
 
-def _impact(n: int, width: int = 2, until: float = 6.6, **settings) -> Impact:
-    """The tank of 1.61 m, open at the top, as a slice `width` cells wide on cells of H/n, to t* = until."""
+def _against_sph(where: str, slipping: Impact, sph, limit: float, told: str = "") -> Finding:
+    """Difference of the pressure at sensor 2 to that of δ-SPH, both without friction."""
+    at = np.linspace(3.0, 6.0, 301)
+    rms = np.sqrt(np.mean((slipping.within(at, 1) - np.interp(at, sph["tstar"], sph["pstar"])) ** 2))
+    what = f"{where}free-slip walls: rms difference of p* to published δ-SPH, 3 < t* < 6{told}"
+    return Finding(what, rms, 0.0, limit, False)
+
+
+def _impact(n: int, width: int = 2, until: float = 6.6, flat: int | None = None, **settings) -> Impact:
+    """The tank of 1.61 m, open at the top, as a slice `width` cells wide on cells of H/n, to t* = until; flat: on the
+    bed up to BED, cells as long and wide are H/flat high, and grow above it as with `[[tank.stretch]]`."""
     cell = DEPTH / n
     size = np.array([round(1.61 / cell) * cell, width * cell, 2 * DEPTH])
     cells = (round(size[0] / cell), width, 2 * n)
+    if flat is not None:
+        layer = Stretch(along="z", upper=BED * DEPTH, cell=DEPTH / flat)
+        axes = [np.linspace(0.0, side, count + 1) for side, count in zip(size, cells)]
+        settings["axes"] = [*axes[:2], graded(0.0, size[2], cell, [layer])]
     settings = {"is_open": top, "is_smooth": slice_sides, "rtol": 1e-7} | settings
     c = tank(size, cells, column(2 * DEPTH, DEPTH), **settings)
     scale, losses = np.sqrt(G / DEPTH), Losses(c.water)

@@ -60,13 +60,15 @@ def tank(
     openings: str = "all",
     split: str = "kuhn",
     refined: Sequence = (),
+    axes=None,
     **parameters,
 ) -> CoupledStepper:
     """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
-    split: see `box_mesh`; openings: of multiple covers, as in a case; refined: regions of `fluid.mesh.refinement`.
+    split: see `box_mesh`; openings: of multiple covers, as in a case; refined: regions of `fluid.mesh.refinement`;
+    axes: three coordinate arrays of graded bricks in place of cells.
 
     fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
-    mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), split=split)
+    mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), axes, split)
     mesh = refined_mesh(mesh, refined) if refined else mesh
     immersion = Immersion(mesh, structure, list(solids), covers, connection=OPENINGS[openings])
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
