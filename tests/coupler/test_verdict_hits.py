@@ -33,6 +33,12 @@ def test_debris_that_loses_its_speed_to_a_wall_has_hit_it(scene):
     assert (hit["speed"], hit["impulse"], hit["force"]) == pytest.approx((3.0, J, J / 0.01))
 
 
+def test_debris_that_the_water_stops_beside_a_wall_it_only_touches_has_not_hit_it(scene):
+    """It loses 3 m/s, of which the contact took a tenth of a metre per second."""
+    J = 500.0 * 0.1
+    assert crate_hits(scene, [[J, 0, 0], [0, 0, 0], [-J, 0, 0]])["pairs"] == 0
+
+
 @pytest.mark.parametrize("shares", [(0.5, 0.5), (0.3, 0.7), (1.0, 0.0)])
 def test_a_blow_that_the_end_of_a_step_divides_is_the_same_hit(scene, shares):
     """The crate is stopped from 0.55 m/s, more than the 0.44 of a fall from a hundredth of its height, wherever
