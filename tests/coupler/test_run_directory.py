@@ -234,3 +234,14 @@ def test_what_is_written_as_json_is_what_the_standard_library_writes(tmp_path):
     assert (tmp_path / "a.json").read_text(encoding="utf-8") == text + "\n"
     with pytest.raises(TypeError, match="set has no form in JSON"):
         write_json(tmp_path / "b.json", {"a": {1}})
+
+
+def test_running_the_case_of_a_run_says_which_of_its_changes_are_not_in_it(file):
+    """The copy of the case lacks what --set gave to that run: without them this would silently be another case."""
+    from coupler.commands.run import _of_the_run
+
+    run = RunDirectory.create(file)
+    (note,) = _of_the_run(load(run.path))
+    assert "made with --set time.end=3, which case.toml does not hold" in note
+    assert not list(_of_the_run(load(run.path, ["time.end=3"])))
+    assert not list(_of_the_run(file))

@@ -284,6 +284,11 @@ def test_a_drop_that_the_cells_cannot_hold_is_refused():
         ([0.5, 0, 0.5], [1.0, 0.2, 0.76], False),
         ([0, 0, 0], [2, 0.2, 0.11], False),
         ([0.5, 0, 0], [0.6, 0.2, 0.5], True),
+        (
+            [1.0, 0, 0.7],
+            [0.5, 0.2, 0.5],
+            False,
+        ),  # corners in the wrong order: refused, but not as a thin drop
     ):
         found = problems(case({"fill": [{"lower": low, "upper": high}]}))
         assert [path for path, text in found if "with air on both sides" in text] == [
@@ -338,6 +343,8 @@ def test_water_is_measured_by_the_cells_that_it_is_in():
     """Finer cells elsewhere resolve neither a layer nor the water at a side; finer cells around it do."""
     layer = {"fill": [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.25]}]}
     assert "0.25 m thin, 2.5 cells" in remarks(in_parts(layer, refine=[HIGH_UP]))[0]
+    cube = {"fill": [{"lower": [0, 0, 0], "upper": [0.25, 0.2, 0.25]}]}
+    assert len([text for text in remarks(in_parts(cube, refine=[HIGH_UP])) if "thin" in text]) == 1
     flat = HIGH_UP | {"lower": [0, 0, 0], "upper": [2, 0.2, 0.3]}
     assert remarks(in_parts(layer, refine=[flat])) == []
     sea = {"sea": [{"side": "x+", "level": 0.1}]}
