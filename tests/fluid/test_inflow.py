@@ -437,3 +437,20 @@ def test_the_start_of_an_inflow_is_in_the_books():
     assert lost > 0.0
     assert sum(change.values()) > 40.0
     assert water.energy_through_sides() == pytest.approx(sum(change.values()), rel=0.02)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_crest_and_trough_of_an_n_wave_have_its_height_and_pass_as_far_apart_as_in_theory(sign):
+    """η ~ sech²θ tanh θ is largest at tanh²θ = 1/3, and θ = γ c t with γ d = 3/2 (3/4)^(1/4) sqrt(H/d) (Tadepalli and
+    Synolakis 1994): steeper waves are shorter with the root of their height."""
+    depth, height, gravity, middle = 2.0, 0.1, 9.81, 5.0
+    flow = waves.n_wave([1.0, 0.0, 0.0], -0.5, depth, height, gravity, middle, sign)
+    times = np.linspace(0.0, 10.0, 20_001)
+    elevation = np.array([flow.level(time) for time in times]) - (-0.5 + depth)
+    assert elevation.max() == pytest.approx(height, rel=1e-6)
+    assert elevation.min() == pytest.approx(-height, rel=1e-6)
+    apart = times[np.argmax(elevation)] - times[np.argmin(elevation)]
+    rate = 1.5 * 0.75**0.25 * np.sqrt(height / depth) * np.sqrt(gravity * depth) / depth
+    assert apart == pytest.approx(sign * 2.0 * np.arctanh(np.sqrt(1.0 / 3.0)) / rate, abs=2e-3)
+    speed = flow.velocity(np.zeros((1, 3)), times[np.argmax(elevation)])[0, 0]
+    assert speed * (depth + elevation.max()) == pytest.approx(np.sqrt(gravity * depth) * height)
