@@ -15,7 +15,8 @@ NOTES = {
     "P38": "Without friction the mean pressure agrees with published frictionless δ-SPH to 0.03. Friction of smooth "
     "walls reduces it to the measured value, but by an amount that depends on the cells, because nothing "
     "mixes the boundary layer; on cells of H/64 sensors 2 and 3 agree with the measurement. It is the cells on the "
-    'bed that count, which are halved once and twice in the rows "on the bed": [water](water.md).',
+    'bed that count, which are halved once and twice in the rows "on the bed"; cells that are half or a quarter as '
+    "high there, and as long as elsewhere, do as well for a tenth of the time: [water](water.md).",
     "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it gives 0.45 to "
     "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, and with separate unknowns 0.70 to 0.84; the "
     "rest is missing in the first 40 ms. The front is late by this time according to the clock of the record, "
