@@ -17,6 +17,7 @@ from coupler.checks.records import STILL, record_remarks, step_at_start
 from coupler.geometry.cell_sizes import edges_at, has_equal_cells, places_in_box
 from coupler.geometry.stretches import axes_of
 from coupler.geometry.tank_mesh import floor_along, mean_bed
+from coupler.program.quantities import counted
 from coupler.scene.build_water import (
     SLACK,
     fills_beside,
@@ -87,7 +88,7 @@ def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
     cells = _cells_across(tank, axis)
     if cells >= LEAST_ACROSS:
         return
-    where = f"the side opposite to {spec.side} is only {cells} cells away"
+    where = f"the side opposite to {spec.side} is only {counted(cells, 'cell')} away"
     wider = f"at least {LEAST_ACROSS} are needed; take a tank that is wider in {spec.side[0]}, or finer cells"
     if follows_inside(spec):
         key, value = ("keeps", '"discharge"') if keeps_discharge(spec) else ("absorbs", "true")

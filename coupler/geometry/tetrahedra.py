@@ -12,6 +12,7 @@ import numpy as np
 
 from array_types import Array
 from coupler.geometry.mesh_files import MeshFileError, read_mesh
+from coupler.program.quantities import counted
 
 BOUNDARY_KINDS = ("vertex", "line", "triangle", "quad", "polygon")
 """Cells that meshers write along with the volume, for marks on its boundary."""
@@ -51,8 +52,9 @@ def _tetrahedra(name: str, kinds: dict[str, Array]) -> Array:
         remedy = "write cells of first order (gmsh: Mesh.ElementOrder = 1)"
         if not kind.startswith("tetra"):
             remedy = "mesh with tetrahedra (gmsh: neither Recombine nor Layers with it), or split each cell into them"
+        cells = counted(len(kinds[kind]), "cell")
         raise MeshFileError(
-            f"{name}: {len(kinds[kind])} cells of kind '{kind}'; the water takes linear tetrahedra only: {remedy}"
+            f"{name}: {cells} of kind '{kind}'; the water takes linear tetrahedra only: {remedy}"
         )
     if "tetra" not in kinds or len(kinds["tetra"]) == 0:
         there = ", ".join(f"{len(rows)} of kind '{kind}'" for kind, rows in kinds.items()) or "none at all"

@@ -12,6 +12,7 @@ import numpy as np
 
 from coupler.case.paths import stamp
 from coupler.program import provenance
+from coupler.program.quantities import counted
 
 FREE = (
     "time.",
@@ -40,11 +41,11 @@ def scene_parts(coupling) -> dict[str, str]:
     structure = coupling.structure
     if structure is not None:
         shapes = np.concatenate([np.zeros((0, 3)), *structure.shape_vertices])
-        parts["blocks"] = _reported(f"{structure.n} blocks", shapes, structure.mass, structure.fixed)
+        parts["blocks"] = _reported(counted(structure.n, "block"), shapes, structure.mass, structure.fixed)
         joints = structure.joints
         if joints is not None:
             arrays = (joints.a, joints.b, joints.xi_a, joints.xi_b, joints.weight, joints.law)
-            parts["joints"] = _reported(f"{len(joints)} joints", *arrays)
+            parts["joints"] = _reported(counted(len(joints), "joint"), *arrays)
     return parts
 
 

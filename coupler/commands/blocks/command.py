@@ -23,7 +23,7 @@ from coupler.program import terminal
 from coupler.program.errors import BadCase
 from coupler.program.extras import missing
 from coupler.program.process import run_module, trouble
-from coupler.program.quantities import quantity
+from coupler.program.quantities import counted, quantity
 from yade_scripts.blocks.polyhedra import fans, hull_faces, shown
 
 WATER = "water"
@@ -97,7 +97,7 @@ def _rows(cut: Cut) -> Iterable[terminal.Row]:
     yield terminal.Row("volume", cut.volume, "m3", "of the drawing; that of the blocks is the same")
     yield terminal.Row("blocks", len(cut.blocks), "", _counted(b.group for b in cut.blocks))
     for name, (volume, count) in cut.layers.items():
-        yield terminal.Row(f"layer {name}", volume, "m3", f"{count} blocks")
+        yield terminal.Row(f"layer {name}", volume, "m3", counted(count, "block"))
     volumes = np.array([b.volume for b in cut.blocks])
     yield terminal.Row(
         "block", float(np.median(volumes)), "m3", f"usual; {volumes.min():.3g} to {volumes.max():.3g}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coupler.program.errors import BadCase, ExitCode
+from coupler.program.quantities import counted
 
 NEGLIGIBLE = 1e-9
 """Errors below this are round-off; they do not get worse."""
@@ -44,7 +45,9 @@ def compare(first: Path, second: Path, error: float, cpu: float) -> ExitCode:
     for line in found:
         print(f"WORSE  {line}")
     common = len(_points(before).keys() & _points(now).keys())
-    print(f"{common} runs compared, {len(found)} figures worse (error x {error:g}, CPU x {cpu:g})")
+    print(
+        f"{counted(common, 'run')} compared, {counted(len(found), 'figure')} worse (error x {error:g}, CPU x {cpu:g})"
+    )
     return ExitCode.DIVERGED if found else ExitCode.DONE
 
 

@@ -22,7 +22,7 @@ from coupler.commands.sweep.results import NUMBERS, Results, collect, write_tabl
 from coupler.program import terminal
 from coupler.program.errors import BadCase, ExitCode, SurgebreakError
 from coupler.program.extras import missing
-from coupler.program.quantities import as_said
+from coupler.program.quantities import as_said, counted
 from coupler.run.fingerprint import differences, program
 
 ENGINES = (
@@ -132,8 +132,11 @@ def _alone(folder: Path) -> Iterator[None]:
 def _make(spec: Spec, request: SweepRequest) -> bool:
     """Make the missing runs; returns whether this was stopped before the end."""
     ids = _to_make(spec, request.any_version)
-    rows = len(spec.rows)
-    print(f"{rows} rows, {len(spec.runs)} runs, {len(ids)} to make; results in {spec.folder}", flush=True)
+    rows, runs = counted(len(spec.rows), "row"), counted(len(spec.runs), "run")
+    print(
+        f"{rows}, {runs}, {len(ids)} to make; results in {spec.folder}",
+        flush=True,
+    )
     if not ids:
         return False
     summary = _Progress(spec, len(ids))
@@ -174,7 +177,7 @@ def _to_make(spec: Spec, any_version: bool) -> list[str]:
             left.append(id)
     if old:
         print(
-            f"note: {old} runs were made by another version of the program and are made again; --any-version keeps them"
+            f"note: {counted(old, 'run')} made by another version of the program, made again; --any-version keeps them"
         )
     return left
 
@@ -244,7 +247,7 @@ def _show(plan: Plan) -> None:
     """The first and last rows on the terminal."""
     head = [c.name + (f" [{c.unit}]" if c.unit else "") for c in plan.columns]
     seeds = list(plan.sweep.seeds)
-    print(f"{len(plan.rows)} rows, {len(plan.runs)} runs")
+    print(f"{counted(len(plan.rows), 'row')}, {counted(len(plan.runs), 'run')}")
     rows = plan.rows if len(plan.rows) <= SHOWN else (*plan.rows[: SHOWN // 2], *plan.rows[-SHOWN // 2 :])
     lines = [["row", *head, *seeds]]
     for row in rows:

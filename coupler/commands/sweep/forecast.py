@@ -17,6 +17,7 @@ from coupler.commands.sweep.folder import Spec, ended
 from coupler.commands.sweep.one import Process, kept_files
 from coupler.program.errors import BadCase
 from coupler.program.process import trouble
+from coupler.program.quantities import counted
 from coupler.program.terminal import Row, duration
 from coupler.results.vtkhdf import read_times
 from coupler.run.summary import read_summary
@@ -37,7 +38,7 @@ def forecast(spec: Spec, jobs: int, forked: bool) -> list[Row]:
         cpu, memory, disk = (
             sum(measured[n] for measured in done) / len(done) for n in ("cpu_seconds", "memory", "disk")
         )
-        source, start = f"mean of {len(done)} runs that are done", 0.0
+        source, start = f"mean of {counted(len(done), 'run')} done so far", 0.0
     else:
         start, cpu, memory, disk = _trial(spec)
         source = "from the first steps of the first run, which also load the kernels: rather less"

@@ -23,6 +23,7 @@ from coupler.commands.sweep.options import keywords
 from coupler.program.errors import BadCase, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import environment
+from coupler.program.quantities import counted
 from coupler.run.directory import write_json
 
 Tell = Callable[[dict], None]
@@ -90,7 +91,10 @@ class Slurm:
             waiting |= self._submit(new)
             write_json(self.spec.folder / "jobs.json", known | waiting)
         jobs = sorted(set(waiting.values()))
-        print(f"{len(waiting)} runs in {len(jobs)} jobs of Slurm, {jobs[0]} to {jobs[-1]}", flush=True)
+        print(
+            f"{counted(len(waiting), 'run')} in {counted(len(jobs), 'job')} of Slurm, {jobs[0]} to {jobs[-1]}",
+            flush=True,
+        )
         if not self.detach:
             self._wait(waiting, tell)
 
