@@ -78,7 +78,8 @@ class Terrain(Section):
     )
     origin: tuple[Length, Length] | None = Field(
         None,
-        description="x, y of the file that are moved to offset; absent: its corner with the lowest coordinates",
+        description="x, y of the file that are moved to offset; absent: its corner with the lowest coordinates, of "
+        "its cells where the file consists of cells",
     )
     turn: Annotated[float, InSI("rad")] = Field(
         0.0, description="rotation about origin, counter-clockwise", examples=["30 deg"]

@@ -99,4 +99,4 @@ def _map_of(path: str, _stamp) -> HeightMap:
     grid = read_grid(Path(path))
     if not (np.diff(grid.x) > 0.0).all() or not (np.diff(grid.y) > 0.0).all():
         raise TerrainError(f"{Path(path).name}: its places do not span a surface")
-    return HeightMap(grid.x, grid.y, grid.z, (0.0, 0.0))
+    return HeightMap(grid.x, grid.y, grid.z, (0.0, 0.0), reach=grid.reach)

@@ -81,9 +81,10 @@ def _ground(case: Case) -> str:
     ground, path = case.tank.ground, Path(case.terrain.path)
     named = case.terrain.crs or case.terrain.reproject or case.terrain.scale != 1.0
     named = named or path.suffix.lower() in NAMES_ITS_UNIT or path.with_suffix(".prj").is_file()
+    covered = " x ".join(f"{high - low:.4g}" for low, high in ground.covered)
     guessed = "" if named else "; the file names no unit and is taken to be in metres (terrain.scale)"
     return (
-        f"terrain {path.name}: {np.ptp(ground.x):.4g} x {np.ptp(ground.y):.4g} m, heights from "
+        f"terrain {path.name}: {covered} m, heights from "
         f"{np.nanmin(ground.z):.4g} to {np.nanmax(ground.z):.4g} m{guessed}"
     )
 

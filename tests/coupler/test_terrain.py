@@ -30,7 +30,7 @@ Z = ground(*np.meshgrid(X, Y, indexing="ij"))
 def write_esri(path, z=Z, more=""):
     rows = "\n".join(" ".join(f"{v:.6f}" for v in z[:, j]) for j in range(z.shape[1] - 1, -1, -1))
     path.write_text(
-        f"# made by a test\nncols {len(z)}\nnrows {z.shape[1]}\nxllcenter 100\nyllcorner 49.5\ncellsize 1\n"
+        f"# made by a test\nncols {len(z)}\nnrows {z.shape[1]}\nxllcenter 100\nyllcenter 50\ncellsize 1\n"
         f"NODATA_value -9999\n{more}{rows}\n"
     )
 
@@ -190,6 +190,40 @@ def test_place_of_the_origin_turn_unit_and_datum(tmp_path):
     feet = terrain_of(Terrain(path=str(tmp_path / "g.asc"), scale=0.3048, positive="down", origin=(0.0, 0.0)))
     x, y = np.array([110.0]), np.array([57.0])
     np.testing.assert_allclose(feet(0.3048 * x, 0.3048 * y), -0.3048 * ground(x, y), atol=1e-6)
+
+
+def write_tile(path, head="xllcorner 500\nyllcorner 200"):
+    """Four by three cells of 2 m."""
+    path.write_text(f"ncols 4\nnrows 3\n{head}\ncellsize 2\n8 9 10 11\n4 5 6 7\n0 1 2 3\n")
+
+
+def test_a_tile_of_cells_covers_its_cells_to_their_rims(tmp_path):
+    """A tank of ncols times cellsize fits into it. Its heights belong to the middles of cells: the plane between them,
+    and no height beyond those of the file in the outer halves of the outermost cells."""
+    write_tile(tmp_path / "g.asc")
+    found = terrain_of(Terrain(path=str(tmp_path / "g.asc")))
+    np.testing.assert_allclose(found.outline, [[0, 0], [8, 0], [8, 6], [0, 6]], atol=1e-9)
+    x, y = np.array([1.0, 4.0, 0.0, 0.5, 8.0]), np.array([1.0, 3.0, 0.0, 3.0, 6.0])
+    np.testing.assert_allclose(found(x, y), [0.0, 5.5, 0.0, 4.0, 11.0], atol=1e-9)
+    assert np.isnan(found(np.array([8.1, 4.0]), np.array([3.0, -0.1]))).all()
+    inner = terrain_of(Terrain(path=str(tmp_path / "g.asc"), crop=((504, 200), (508, 203)), scale=0.5))
+    assert inner.covered == ((251.5, 254.0), (100.0, 101.5)), (
+        "cropped: from points that were kept, else to the rim"
+    )
+    write_tile(tmp_path / "p.asc", "xllcenter 500\nyllcenter 200")
+    points = terrain_of(Terrain(path=str(tmp_path / "p.asc"), origin=(500, 200)))
+    np.testing.assert_allclose(points.outline, [[0, 0], [6, 0], [6, 4], [0, 4]], atol=1e-9)
+
+
+def test_a_tank_half_a_spacing_larger_than_a_file_of_points_is_told_of_cells(tmp_path):
+    rows = [f"{x} {y} 0" for x in range(1, 60, 2) for y in range(1, 24, 2)]
+    (tmp_path / "g.xyz").write_text("\n".join(rows))
+    text = CASE.replace("g.asc", "g.xyz").replace('"g.xyz"', '"g.xyz"\norigin = [0, 0]')
+    for upper, told in (("[60, 24, 3]", True), ("[63, 24, 3]", False)):
+        (tmp_path / "case.toml").write_text(re.sub(r"upper = \[.*", f"upper = {upper}", text))
+        with pytest.raises(BadCase) as found:
+            load(tmp_path, ())
+        assert ("middles of cells" in str(found.value)) == told
 
 
 def test_holes_are_filled_harmonically_and_only_on_demand(tmp_path):

@@ -48,6 +48,18 @@ def test_geotiff_is_read_once_and_kept_beside_it(tmp_path):
     np.testing.assert_array_equal(again.z, found.z)
 
 
+def test_a_tile_covers_its_pixels_to_their_rims_unless_they_are_points(tmp_path):
+    write(tmp_path / "site.tif", "EPSG:32654", 388200.0, 4253000.0, 2.0)
+    found = terrain_of(Terrain(path=str(tmp_path / "site.tif")))
+    np.testing.assert_allclose(found.covered, [[388200, 388260], [4252960, 4253000]])
+    np.testing.assert_allclose(found(np.array([60.0]), np.array([0.0])), 2.0 + 0.3 * 29 - 0.2 * 19, atol=1e-5)
+    point = "import sys, rasterio; rasterio.open(sys.argv[1], 'r+').update_tags(AREA_OR_POINT='Point')"
+    subprocess.run([sys.executable, "-c", point, tmp_path / "site.tif"], check=True, capture_output=True)
+    np.testing.assert_allclose(
+        terrain_of(Terrain(path=str(tmp_path / "site.tif"))).covered, [[388201, 388259], [4252961, 4252999]]
+    )
+
+
 def test_heights_stored_with_a_scale_and_an_offset(tmp_path):
     """As whole centimetres above a datum, for instance: height = scale times number + offset."""
     write(tmp_path / "site.tif", "EPSG:32654", 388200.0, 4253000.0, 2.0, scale=0.01, offset=7.5)

@@ -155,7 +155,9 @@ def _moved(found: Offshore, ground: HeightMap | None, X: Array, Y: Array) -> Arr
         place = (
             {} if ground is None else {"pivot": ground.pivot, "origin": ground.origin, "turn": ground.turn}
         )
-        here = HeightMap(scale * grid.x, scale * grid.y, grid.z, **place)(X, Y)
+        (west, east), (south, north) = grid.reach
+        reach = (scale * west, scale * east), (scale * south, scale * north)
+        here = HeightMap(scale * grid.x, scale * grid.y, grid.z, reach=reach, **place)(X, Y)
         moved += np.where(np.isfinite(here), here, 0.0)
     return moved
 

@@ -36,19 +36,14 @@ def _unknown(ground: HeightMap, X, Y, z) -> Iterator[Problem]:
     if not unknown.any():
         return
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
-    edge = np.column_stack(ground.in_file(X, Y))
-    dx, dy = ground.spacing
-    beside = (
-        (edge[:, 0] < ground.x[0] - 1e-6 * dx) | (edge[:, 0] > ground.x[-1] + 1e-6 * dx)
-        | (edge[:, 1] < ground.y[0] - 1e-6 * dy) | (edge[:, 1] > ground.y[-1] + 1e-6 * dy)
-    )  # fmt: skip
+    beside = ~ground.covers(*ground.in_file(X, Y))
     out, hole = unknown & beside, unknown & ~beside
     if out.any():
         yield (
             ("terrain",),
             f"{out.mean():.1%} of the tank lies beside it, for instance ({X[out][0]:.6g}, {Y[out][0]:.6g}) m: it "
-            f"covers x {low[0]:.6g} to {high[0]:.6g}, y {low[1]:.6g} to {high[1]:.6g} m of the tank's coordinates; "
-            "move it (terrain.origin, terrain.offset) or take a smaller tank",
+            f"covers x {low[0]:.6g} to {high[0]:.6g}, y {low[1]:.6g} to {high[1]:.6g} m of the tank's coordinates"
+            f"{_by_cells(ground, X[out], Y[out])}; move it (terrain.origin, terrain.offset) or take a smaller tank",
         )
     if hole.any():
         yield (
@@ -56,6 +51,23 @@ def _unknown(ground: HeightMap, X, Y, z) -> Iterator[Problem]:
             f"it has holes (no data) under {hole.mean():.1%} of the tank, for instance at ({X[hole][0]:.6g}, "
             f"{Y[hole][0]:.6g}) m; fill = true closes them smoothly, crop or another tank avoids them",
         )
+
+
+def _by_cells(ground: HeightMap, X, Y) -> str:
+    """What to know of a file of points where only half a spacing is missing: those of a tile of cells are their
+    middles, and a tank of ncols times cellsize does not fit between them."""
+    (west, east), (south, north) = ground.covered
+    u, v = ground.in_file(X, Y)
+    dx, dy = (0.5 * (1.0 + 1e-6) * step for step in ground.spacing)
+    if (
+        min((u - west).min() + dx, (east - u).min() + dx, (v - south).min() + dy, (north - v).min() + dy)
+        < 0.0
+    ):
+        return ""
+    return (
+        ", from its first to its last points, half a spacing short on each side; where these points are the middles of "
+        "cells, give it as an ESRI grid with xllcorner and yllcorner (.asc) or as a GeoTIFF, which cover whole cells"
+    )
 
 
 def _heights(case, X, Y, z) -> Iterator[Problem]:

@@ -57,7 +57,9 @@ def without(z: Array, mark: float) -> Array:
 
 
 def _esri(path: Path, _variable) -> Grid:
-    """The ASCII grid of ESRI (ArcInfo): six lines of head, rows from north to south."""
+    """The ASCII grid of ESRI (ArcInfo): six lines of head, rows from north to south. One that names the corner of its
+    cells covers all of them; one that names the middle of the first covers what lies between the middles, as grids
+    whose heights belong to points are written so too."""
     head, rest = _esri_head(path)
     if "dx" in head and "dy" in head:
         head.setdefault("cellsize", head["dx"])
@@ -78,7 +80,8 @@ def _esri(path: Path, _variable) -> Grid:
     half = {name: 0.5 * size[name] if f"{name}llcorner" in head else 0.0 for name in "xy"}
     x0 = head.get("xllcorner", head.get("xllcenter", 0.0)) + half["x"]
     y0 = head.get("yllcorner", head.get("yllcenter", 0.0)) + half["y"]
-    return Grid(x0 + size["x"] * np.arange(nx), y0 + size["y"] * np.arange(ny), z, crs=sidecar(path))
+    x, y = x0 + size["x"] * np.arange(nx), y0 + size["y"] * np.arange(ny)
+    return Grid(x, y, z, crs=sidecar(path), rim=(half["x"], half["y"]))
 
 
 def _esri_head(path: Path) -> tuple[dict[str, float], str]:

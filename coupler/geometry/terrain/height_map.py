@@ -2,7 +2,8 @@
 
     (x, y) = origin + R(turn) [(X, Y) - pivot]          X, Y: coordinates of the file [m], z: heights after the datum
 
-Between the points of the raster heights are bilinear.
+Between the points of the raster heights are bilinear. Where the points are the middles of cells, the height of the
+outermost ones holds up to the rim of their cells.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from array_types import Array
+from coupler.geometry.terrain.grid import Reach
 
 BESIDE = 1e-6
 """Share of a spacing by which a place may lie beside the raster and count as on its edge."""
@@ -21,7 +23,8 @@ BESIDE = 1e-6
 @dataclass(frozen=True, eq=False)
 class HeightMap:
     """x (nx,), y (ny,) [m], evenly spaced coordinates of the points in the file · z (nx, ny) [m], NaN where unknown ·
-    pivot, origin (2,) [m], turn [rad]: its place in the tank."""
+    pivot, origin (2,) [m], turn [rad]: its place in the tank · reach: what it covers in the file [m]; absent: from its
+    first to its last points."""
 
     x: Array
     y: Array
@@ -29,6 +32,7 @@ class HeightMap:
     pivot: tuple[float, float] = (0.0, 0.0)
     origin: tuple[float, float] = (0.0, 0.0)
     turn: float = 0.0
+    reach: Reach | None = None
 
     @cached_property
     def spacing(self) -> tuple[float, float]:
@@ -39,8 +43,9 @@ class HeightMap:
         """z (n,) [m] at places x, y (n,) [m] of the tank; NaN beside the raster and in its holes."""
         X, Y = self.in_file(np.asarray(x, float), np.asarray(y, float))
         dx, dy = self.spacing
-        i, s, in_x = _cell((X - self.x[0]) / dx, len(self.x))
-        j, t, in_y = _cell((Y - self.y[0]) / dy, len(self.y))
+        known = self.covers(X, Y)
+        i, s = _cell(np.where(known, X - self.x[0], 0.0) / dx, len(self.x))
+        j, t = _cell(np.where(known, Y - self.y[0], 0.0) / dy, len(self.y))
         z = self.z
         # a corner without weight must not spoil a place on the edge of a hole
         parts = (
@@ -50,7 +55,21 @@ class HeightMap:
             (s * t, z[i + 1, j + 1]),
         )
         height = sum(np.where(w > 0.0, w * corner, 0.0) for w, corner in parts)
-        return np.where(in_x & in_y, height, np.nan)
+        return np.where(known, height, np.nan)
+
+    @cached_property
+    def covered(self) -> Reach:
+        """Lowest and highest x and y [m] of the file that heights hold for."""
+        if self.reach is not None:
+            return self.reach
+        return (float(self.x[0]), float(self.x[-1])), (float(self.y[0]), float(self.y[-1]))
+
+    def covers(self, X, Y) -> Array:
+        """Whether (n,) coordinates [m] of the file lie on it, holes included."""
+        (west, east), (south, north) = self.covered
+        dx, dy = (BESIDE * step for step in self.spacing)
+        in_x, in_y = (west - dx <= X) & (east + dx >= X), (south - dy <= Y) & (north + dy >= Y)
+        return in_x & in_y
 
     def in_file(self, x, y) -> tuple[Array, Array]:
         """Coordinates [m] in the file of places of the tank."""
@@ -66,9 +85,9 @@ class HeightMap:
 
     @cached_property
     def outline(self) -> Array:
-        """Corners (4, 2) [m] of the raster in the tank, counter-clockwise."""
-        X = np.array([self.x[0], self.x[-1], self.x[-1], self.x[0]])
-        Y = np.array([self.y[0], self.y[0], self.y[-1], self.y[-1]])
+        """Corners (4, 2) [m] of what it covers in the tank, counter-clockwise."""
+        (west, east), (south, north) = self.covered
+        X, Y = np.array([west, east, east, west]), np.array([south, south, north, north])
         return np.column_stack(self.in_tank(X, Y))
 
     @cached_property
@@ -82,8 +101,7 @@ class HeightMap:
 
 
 def _cell(place, points: int):
-    """Interval, share of it and whether on the raster, of places in spacings from the first of so many points."""
-    inside = (place >= -BESIDE) & (place <= points - 1 + BESIDE)
-    place = np.clip(np.where(inside, place, 0.0), 0.0, points - 1)
+    """Interval and share of it, of places in spacings from the first of so many points; beside them that at the end."""
+    place = np.clip(place, 0.0, points - 1)
     i = np.minimum(place.astype(np.int64), points - 2)
-    return i, place - i, inside
+    return i, place - i

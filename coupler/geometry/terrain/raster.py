@@ -37,14 +37,15 @@ def reprojected(name: str, grid: Grid, source: str, target: str) -> Grid:
         )
     with tempfile.TemporaryDirectory() as folder:
         before, after = Path(folder) / "before.npz", Path(folder) / "after.npz"
-        np.savez(before, x=grid.x, y=grid.y, z=grid.z)
+        np.savez(before, x=grid.x, y=grid.y, z=grid.z, rim=np.array(grid.rim))
         _call(name, "reproject", str(before), str(after), source, target)
         return _loaded(after)
 
 
 def _loaded(path: Path) -> Grid:
     with np.load(path) as file:
-        return Grid(file["x"], file["y"], file["z"], str(file["crs"]), tuple(file["notes"].tolist()))
+        notes, (a, b) = tuple(file["notes"].tolist()), file["rim"].tolist()
+        return Grid(file["x"], file["y"], file["z"], str(file["crs"]), notes, (a, b))
 
 
 def _call(name: str, *words: str) -> None:
@@ -72,12 +73,14 @@ def _read(path: str, out: str) -> None:
         crs = file.crs.to_wkt() if file.crs else ""
         notes = [f"band 1 of {file.count}"] if file.count > 1 else []
         scale, offset = file.scales[0], file.offsets[0]
+        points = file.tags().get("AREA_OR_POINT", "Area").lower() == "point"
+    rim = np.zeros(2) if points else 0.5 * np.abs([t.a, t.e])
     z = (scale * z + offset).T
     if t.a < 0:
         x, z = x[::-1], z[::-1]
     if t.e < 0:
         y, z = y[::-1], z[:, ::-1]
-    np.savez(out, x=x, y=y, z=z, crs=crs, notes=np.array(notes, str))
+    np.savez(out, x=x, y=y, z=z, crs=crs, notes=np.array(notes, str), rim=rim)
 
 
 def _reproject(before: str, out: str, source: str, target: str) -> None:
@@ -93,7 +96,7 @@ def _reproject(before: str, out: str, source: str, target: str) -> None:
     if new.is_geographic:
         sys.exit(f"{target} counts in degrees; reproject to a metric system, for instance UTM")
     with np.load(before) as file:
-        x, y, z = file["x"], file["y"], file["z"]
+        x, y, z, cells = file["x"], file["y"], file["z"], bool(file["rim"].all())
     dx, dy = x[1] - x[0], y[1] - y[0]
     place = from_origin(x[0] - dx / 2, y[-1] + dy / 2, dx, dy)
     bounds = (x[0] - dx / 2, y[0] - dy / 2, x[-1] + dx / 2, y[-1] + dy / 2)
@@ -107,7 +110,10 @@ def _reproject(before: str, out: str, source: str, target: str) -> None:
     y = (to.f + to.e * (np.arange(height) + 0.5))[::-1]
     factor = new.linear_units_factor[1]
     note = f"from {source} to {target}, {width} x {height} points every {to.a * factor:.3g} m"
-    np.savez(out, x=x * factor, y=y * factor, z=turned[::-1].T, crs=new.to_wkt(), notes=np.array([note]))
+    rim = 0.5 * factor * np.abs([to.a, to.e]) if cells else np.zeros(2)
+    np.savez(
+        out, x=x * factor, y=y * factor, z=turned[::-1].T, crs=new.to_wkt(), notes=np.array([note]), rim=rim
+    )
 
 
 if __name__ == "__main__":

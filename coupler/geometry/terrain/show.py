@@ -28,7 +28,8 @@ def of_file(path: Path, more: dict) -> tuple[HeightMap, list[Row]]:
     try:
         ground = terrain_of(spec)
     except TerrainError as error:
-        return HeightMap(grid.x, grid.y, grid.z), [*rows, Row("as a terrain", "refused", "", str(error))]
+        refused = Row("as a terrain", "refused", "", str(error))
+        return HeightMap(grid.x, grid.y, grid.z, reach=grid.reach), [*rows, refused]
     return ground, [*rows, *_ground_rows(ground)]
 
 
@@ -38,8 +39,10 @@ def _file_rows(grid: Grid) -> list[Row]:
     crs = grid.crs[:60] if grid.crs else "none given"
     rows = [
         Row("points", f"{nx} x {ny}", "", f"every {dx:.6g} x {dy:.6g} units of the file"),
-        Row("x", f"{grid.x[0]:.10g} to {grid.x[-1]:.10g}", "", "units of the file"),
-        Row("y", f"{grid.y[0]:.10g} to {grid.y[-1]:.10g}", "", "units of the file"),
+        *(
+            Row(name, f"{low:.10g} to {high:.10g}", "", f"units of the file{_rim(rim)}")
+            for name, (low, high), rim in zip("xy", grid.reach, grid.rim)
+        ),
         Row(
             "coordinate system",
             crs,
@@ -51,6 +54,11 @@ def _file_rows(grid: Grid) -> list[Row]:
     return rows + [Row("note", note) for note in grid.notes]
 
 
+def _rim(rim: float) -> str:
+    """Whether heights hold beyond the outermost points."""
+    return ", with the outer halves of its outermost cells" if rim else ""
+
+
 def _ground_rows(ground: HeightMap) -> list[Row]:
     z = ground.z[np.isfinite(ground.z)]
     slope = ground.slopes[np.isfinite(ground.slopes)]
@@ -58,7 +66,7 @@ def _ground_rows(ground: HeightMap) -> list[Row]:
     rows = [
         Row(
             "extent",
-            f"{np.ptp(ground.x):.6g} x {np.ptp(ground.y):.6g}",
+            " x ".join(f"{high - low:.6g}" for low, high in ground.covered),
             "m",
             f"a height every {dx:.4g} x {dy:.4g} m",
         ),

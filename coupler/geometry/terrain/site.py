@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from array_types import Array
-from coupler.geometry.terrain.grid import Grid, TerrainError
+from coupler.geometry.terrain.grid import Grid, Reach, TerrainError
 from coupler.geometry.terrain.grids import MOST_POINTS, read_grid, without
 from coupler.geometry.terrain.height_map import HeightMap
 
@@ -27,7 +27,7 @@ LONELY = 5000.0
 """Height [m] between the lowest or highest points of a file and all others from which they are no ground."""
 KEPT = ".terrain"
 """Folder beside the file."""
-FORMAT = 2
+FORMAT = 3
 """Version of the steps below; after a change, rasters kept before are made again."""
 FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
 MERCATOR = re.compile(r"(?:pseudo|web)[ _-]mercator|EPSG\W+(?:3857|3785|900913)\b", re.IGNORECASE)
@@ -59,14 +59,14 @@ def scaled_twice(spec) -> str:
 
 @lru_cache(maxsize=2)
 def _placed(spec, _stamp) -> HeightMap:
-    x, y, z = _kept(spec)
-    pivot = spec.origin or (float(x[0]), float(y[0]))
+    x, y, z, reach = _kept(spec)
+    pivot = spec.origin or (reach[0][0], reach[1][0])
     dx, dy, dz = spec.offset
-    return HeightMap(x, y, z + dz, pivot, (dx, dy), spec.turn)
+    return HeightMap(x, y, z + dz, pivot, (dx, dy), spec.turn, reach)
 
 
-def _kept(spec) -> tuple[Array, Array, Array]:
-    """x, y, z of the edited raster, from the folder if they are there."""
+def _kept(spec) -> tuple[Array, Array, Array, Reach]:
+    """x, y, z of the edited raster and what it covers, from the folder if they are there."""
     path = Path(spec.path)
     if not path.is_file():
         read_grid(path)  # raises with the reason
@@ -74,26 +74,27 @@ def _kept(spec) -> tuple[Array, Array, Array]:
     if store.is_file():
         try:
             with np.load(store) as file:
-                return file["x"], file["y"], file["z"]
+                (west, east), (south, north) = file["reach"].tolist()
+                return file["x"], file["y"], file["z"], ((west, east), (south, north))
         except (OSError, ValueError, KeyError, EOFError):
             store.unlink(missing_ok=True)  # incomplete after a kill
-    x, y, z = _edited(path.name, read_grid(path, spec.variable), spec)
+    x, y, z, reach = _edited(path.name, read_grid(path, spec.variable), spec)
     if path.suffix.lower() in SLOW:
-        _keep(store, x, y, z)
-    return x, y, z
+        _keep(store, x=x, y=y, z=z, reach=np.array(reach))
+    return x, y, z, reach
 
 
 SLOW = (".tif", ".tiff", ".nc", ".grd", ".stl", ".ply", ".obj")
 """Endings of files whose reading takes longer than that of what is kept."""
 
 
-def _keep(store: Path, x, y, z) -> None:
+def _keep(store: Path, **arrays: Array) -> None:
     """Keep the edited raster; the file is written completely or not at all. A folder that is not writable costs only
     time."""
     new = store.with_name(f"{store.stem}-{os.getpid()}.tmp.npz")
     try:
         store.parent.mkdir(exist_ok=True)
-        np.savez(new, x=x, y=y, z=z)
+        np.savez(new, **arrays)
         new.replace(store)
     except OSError:
         new.unlink(missing_ok=True)
@@ -108,7 +109,7 @@ def _checksum(spec) -> str:
     return digest.hexdigest()[:16]
 
 
-def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
+def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array, Reach]:
     crs = spec.crs or grid.crs
     if spec.no_data is not None:
         grid = replace(grid, z=without(grid.z, spec.no_data))
@@ -132,13 +133,15 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
             f"{name}: its coordinate system counts in feet ({FEET.search(crs)[0][5:].strip(chr(34))}); write scale = "
             '"1 ft", and height_scale where heights have another unit'
         )
-    x, y, z = _cropped(name, grid, spec.crop)
+    x, y, z, ends = _cropped(name, grid, spec.crop)
     if z.size > MOST_POINTS:
         raise TerrainError(
             f"{name}: {z.size:.3g} points; crop it (terrain.crop) to fewer than {MOST_POINTS:.3g}"
         )
     _refuse_marks(name, z, height_unit)
     x, y = x * unit, y * unit
+    (west, east), (south, north) = ends
+    reach = (west * unit, east * unit), (south * unit, north * unit)
     z = (z if spec.positive == "up" else -z) * height_unit - spec.zero
     if spec.fill:
         z = filled(z, x, y)
@@ -146,7 +149,7 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
         z = smoothed(z, x, y, spec.smooth)
     if spec.steepest is not None:
         z = flattened(z, x, y, float(np.tan(spec.steepest)))
-    return x, y, z
+    return x, y, z, reach
 
 
 def _refuse_marks(name: str, z, unit: float) -> None:
@@ -195,10 +198,11 @@ def _utm(longitude: float, latitude: float) -> str:
     return f"EPSG:{32600 + zone if latitude >= 0.0 else 32700 + zone}"
 
 
-def _cropped(name: str, grid: Grid, crop) -> tuple[Array, Array, Array]:
+def _cropped(name: str, grid: Grid, crop) -> tuple[Array, Array, Array, Reach]:
+    """x, y, z of what is kept, and what it covers: up to the rim of the file, where nothing was cut off."""
     if crop is None:
-        return grid.x, grid.y, grid.z
-    found = []
+        return grid.x, grid.y, grid.z, grid.reach
+    found, ends = [], []
     for k, (letter, axis) in enumerate((("x", grid.x), ("y", grid.y))):
         low, high = crop[0][k], crop[1][k]
         step = axis[1] - axis[0]
@@ -208,8 +212,13 @@ def _cropped(name: str, grid: Grid, crop) -> tuple[Array, Array, Array]:
                 f"{name}: terrain.crop keeps {letter} from {low:g} to {high:g}, but the file reaches from {axis[0]:g} "
                 f"to {axis[-1]:g} (units of the file)"
             )
-        found.append(slice(inside[0], inside[-1] + 1))
-    return grid.x[found[0]], grid.y[found[1]], grid.z[found[0], found[1]]
+        first, last = inside[0], inside[-1]
+        found.append(slice(first, last + 1))
+        start, end = grid.reach[k]
+        ends.append(
+            (start if first == 0 else float(axis[first]), end if last == len(axis) - 1 else float(axis[last]))
+        )
+    return grid.x[found[0]], grid.y[found[1]], grid.z[found[0], found[1]], (ends[0], ends[1])
 
 
 # ---------------------------------------------------------------- heights
