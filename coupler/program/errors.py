@@ -38,6 +38,10 @@ class BadCase(SurgebreakError):
         super().__init__("\n".join(self.lines))
 
 
+class BadCall(BadCase):
+    """The words after the command cannot be used, whatever the case is; the message has one line for each fault."""
+
+
 class UnknownName(SurgebreakError):
     """A name that no case file knows was asked for."""
 

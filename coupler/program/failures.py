@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from coupler.program import terminal
-from coupler.program.errors import FULL, BadCase, ExitCode
+from coupler.program.errors import FULL, BadCall, BadCase, ExitCode
 
 OURS = ("coupler", "fluid", "yade_scripts")
 CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -109,7 +109,7 @@ class Failures:
             return
         failure = Failure.of(error)
         if isinstance(error, BadCase):
-            _tell_mistakes(error.lines)
+            _tell_mistakes(error)
         else:
             terminal.error(failure.message)
         log = getattr(error, "log_path", None)
@@ -122,12 +122,14 @@ class Failures:
         raise SystemExit(int(failure.exit_code)) from None
 
 
-def _tell_mistakes(lines: list[str]) -> None:
+def _tell_mistakes(error: BadCase) -> None:
     """Print one line for each mistake, beginning with the place as compilers do, which editors recognise."""
+    lines = error.lines
     for line in lines:
         print(line, file=sys.stderr)
     count = "1 mistake" if len(lines) == 1 else f"{len(lines)} mistakes"
-    terminal.error(f"{count} in the case; nothing was run")
+    where = "call" if isinstance(error, BadCall) else "case"
+    terminal.error(f"{count} in the {where}; nothing was run")
 
 
 def _is_click(error: BaseException) -> bool:

@@ -65,6 +65,25 @@ def test_a_bad_case_ends_with_two_and_one_line_for_each_mistake(tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["verify", "P999"], "P999: "),
+        (["stress", "C999"], "C999: "),
+        (["sweep", "CASE", "--plan", "--vary", "tank.cell"], "--vary tank.cell: write KEY=A,B,..."),
+        (["sweep", "CASE", "--engine", "slurn"], "--engine slurn: there are "),
+        (["benchmark", "--only", "joint"], "--only joint: choose one of "),
+    ],
+)
+def test_a_mistake_in_the_call_is_not_said_to_be_in_a_case(words, line, tmp_path):
+    write(tmp_path, WATER)
+    done = surgebreak(*[tmp_path if word == "CASE" else word for word in words])
+    assert done.returncode == 2
+    told, count = done.stderr.splitlines()
+    assert told.startswith(line)
+    assert count == "surgebreak: 1 mistake in the call; nothing was run"
+
+
 @pytest.mark.parametrize("words", [["check"], ["run", "--dry"]])
 def test_a_case_is_read_and_checked_once(words, tmp_path, monkeypatch):
     """Twice or three times was the cost of a terrain or a drawing, which are read with it."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from coupler.commands.benchmark import cutting, debris, scenes, threads
 from coupler.commands.benchmark.part import LAW
 from coupler.program import provenance
-from coupler.program.errors import BadCase, ExitCode, SurgebreakError
+from coupler.program.errors import BadCall, ExitCode, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import run_module, trouble
 from yade_scripts.blocks.faces import touching_faces
@@ -64,10 +64,10 @@ class Line:
 
 
 def benchmark(quick: bool, as_json: bool, only: str | None = None) -> ExitCode:
-    """Measure and print; exits with DIVERGED if a target is missed. only: one of GROUPS, None: all. Raises BadCase for
+    """Measure and print; exits with DIVERGED if a target is missed. only: one of GROUPS, None: all. Raises BadCall for
     another name."""
     if only is not None and only not in GROUPS:
-        raise BadCase([f"--only {only}: choose one of {', '.join(GROUPS)}"])
+        raise BadCall([f"--only {only}: choose one of {', '.join(GROUPS)}"])
     chosen = GROUPS if only is None else (only,)
     if "solver" in chosen:
         need("benchmark")  # now, not after the measurements before it

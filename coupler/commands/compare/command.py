@@ -11,7 +11,7 @@ from coupler.commands.compare.plan import make_plan
 from coupler.commands.compare.report import table, write
 from coupler.commands.compare.run import run_plan
 from coupler.commands.pictures import draw
-from coupler.program.errors import BadCase, ExitCode
+from coupler.program.errors import BadCall, ExitCode
 from coupler.run.directory import RunDirectory
 from yade_scripts.joints import laws as own_laws
 from yade_scripts.stock.script import stock_law, stock_names
@@ -58,5 +58,5 @@ def _multiples(text: str) -> list[int]:
     found = _words(text)
     wrong = [word for word in found if not word.isdecimal() or not 1 <= int(word) <= 100]
     if wrong or not found:
-        raise BadCase([f"--substeps {text}: write whole numbers from 1 to 100, for instance 1,2,4,8"])
+        raise BadCall([f"--substeps {text}: write whole numbers from 1 to 100, for instance 1,2,4,8"])
     return [int(word) for word in found]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from coupler.checks.read_case import CaseFile, load
 from coupler.commands.compare.matching import matched
-from coupler.program.errors import BadCase, did_you_mean
+from coupler.program.errors import BadCall, BadCase, did_you_mean
 from yade_scripts.joints import laws as own_laws
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.stock.script import StockLaw, stock_law, stock_names
@@ -60,7 +60,7 @@ def make_plan(
     wanted = list(names) or [*own_laws.names(), *USUAL_STOCK]
     wrong = [n for n in wanted if n not in (*own_laws.names(), *stock_names())]
     if wrong:
-        raise BadCase(_unknown(name) for name in wrong)
+        raise BadCall(_unknown(name) for name in wrong)
     others = list(dict.fromkeys(n for n in wanted if n != reference))
     found = tuple(_law(name, file, overrides) for name in [reference, *others])
     return Plan(file, found, tuple(sorted(set(substeps))), records)

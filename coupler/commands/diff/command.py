@@ -12,13 +12,13 @@ from coupler.commands.diff.curves import chosen
 from coupler.commands.diff.figures import Run, rows
 from coupler.commands.diff.page import CURVES, content, page
 from coupler.commands.diff.table import text
-from coupler.program.errors import BadCase
+from coupler.program.errors import BadCall
 from coupler.run.directory import as_json, write_json
 from coupler.run.summary import read_summary
 
 
 def diff(paths: Sequence[Path], to: Path | None, names: Sequence[str], only_json: bool) -> None:
-    """Print how runs differ; with `to`, also write diff.html, diff.json and the figures there. Raises NoRun, BadCase,
+    """Print how runs differ; with `to`, also write diff.html, diff.json and the figures there. Raises NoRun, BadCall,
     UnknownName."""
     runs = _read(paths)
     changed = changes([run.summary["case"] for run in runs], [run.files for run in runs])
@@ -40,5 +40,5 @@ def diff(paths: Sequence[Path], to: Path | None, names: Sequence[str], only_json
 
 def _read(paths: Sequence[Path]) -> list[Run]:
     if not 2 <= len(paths) <= len(ascii_uppercase):
-        raise BadCase([f"surgebreak diff: name two runs or more, {len(ascii_uppercase)} at most"])
+        raise BadCall([f"surgebreak diff: name two runs or more, {len(ascii_uppercase)} at most"])
     return [Run(path, label, read_summary(path)) for path, label in zip(paths, ascii_uppercase)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from coupler.commands.stress.registry import Measure, Outcome, Scene, scenes
-from coupler.program.errors import BadCase, did_you_mean
+from coupler.program.errors import BadCall, did_you_mean
 from coupler.program.process import rows_of_module
 
 TIME_LIMIT = {"S": 600, "M": 3600}
@@ -13,7 +13,7 @@ TIME_LIMIT = {"S": 600, "M": 3600}
 
 
 def chosen(ids: list[str], quick: bool) -> list[Scene]:
-    """The scenes asked for, by id or group; all without; with quick only those of cost S. Raises BadCase, also where
+    """The scenes asked for, by id or group; all without; with quick only those of cost S. Raises BadCall, also where
     none is left."""
     known = scenes()
     groups = sorted({s.group for s in known.values()})
@@ -24,12 +24,12 @@ def chosen(ids: list[str], quick: bool) -> list[Scene]:
         if word.upper() not in known and word not in groups
     ]
     if wrong:
-        raise BadCase(wrong)
+        raise BadCall(wrong)
     words = {word.upper() for word in ids} | set(ids)
     found = [s for s in known.values() if not ids or s.id in words or s.group in words]
     left = [s for s in found if s.cost == "S" or not quick]
     if not left:
-        raise BadCase([f"--quick leaves out {', '.join(s.id for s in found)}: each takes minutes"])
+        raise BadCall([f"--quick leaves out {', '.join(s.id for s in found)}: each takes minutes"])
     return left
 
 

@@ -19,7 +19,7 @@ from coupler.case.study_names import without_places
 from coupler.case.toml_text import inline
 from coupler.case.units import to_si
 from coupler.checks.read_case import CaseFile, load
-from coupler.program.errors import BadCase, UnitError
+from coupler.program.errors import BadCall, BadCase, UnitError
 from coupler.run.fingerprint import run_inputs
 
 
@@ -85,7 +85,7 @@ def make_plan(place: Path, chosen: Iterable[str] = (), larger: bool = False) -> 
         f"--ladder {n}: no such ladder; there are {', '.join(ladders)}" for n in wanted if n not in ladders
     ]
     if wrong:
-        raise BadCase(wrong)
+        raise BadCall(wrong)
     made = _Settings(file, study)
     base = made.add(())
     taken = [ladders[n] for n in ladders if n in wanted]

@@ -20,7 +20,7 @@ from coupler.commands.sweep.one import FINAL
 from coupler.commands.sweep.plan import Plan, make_plan
 from coupler.commands.sweep.results import NUMBERS, Results, collect, write_tables
 from coupler.program import terminal
-from coupler.program.errors import BadCase, ExitCode, SurgebreakError
+from coupler.program.errors import BadCall, ExitCode, SurgebreakError
 from coupler.program.extras import missing
 from coupler.program.quantities import as_said, counted
 from coupler.run.fingerprint import differences, program
@@ -109,7 +109,7 @@ def _check(request: SweepRequest) -> None:
         wrong.append("--option, --chunk and --detach are for cluster engines; give --engine")
     wrong += [f"--option {o}: write KEY=VALUE" for o in request.options if "=" not in o]
     if wrong:
-        raise BadCase(wrong)
+        raise BadCall(wrong)
 
 
 @contextlib.contextmanager

@@ -23,7 +23,7 @@ from coupler.commands.sweep import time_limit
 from coupler.commands.sweep.folder import Spec, read_spec
 from coupler.commands.sweep.one import OPEN, Process, make
 from coupler.commands.sweep.options import keywords
-from coupler.program.errors import BadCase
+from coupler.program.errors import BadCall
 from coupler.program.extras import need
 from coupler.program.process import environment
 
@@ -137,7 +137,7 @@ class Dask:
         return math.inf
 
     def _cluster(self):
-        """A started cluster. Raises BadCase for unknown options."""
+        """A started cluster. Raises BadCall for unknown options."""
         if self.kind == "local":
             from distributed import LocalCluster
 
@@ -147,7 +147,7 @@ class Dask:
         try:
             return getattr(jobqueue(), CLUSTERS[self.kind])(**self.words())
         except (TypeError, ValueError) as error:
-            raise BadCase([f"--engine dask-{self.kind}: {error}"]) from error
+            raise BadCall([f"--engine dask-{self.kind}: {error}"]) from error
 
     def words(self) -> dict:
         """Keywords of the class of dask-jobqueue. Raises ValueError for a time limit that cannot be read."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from coupler.program.errors import BadCase
+from coupler.program.errors import BadCall
 
 Value = int | str | list[str]
 
@@ -12,7 +12,7 @@ Value = int | str | list[str]
 def keywords(options: Iterable[str], lists: Collection[str]) -> dict[str, Value]:
     """Values by key: whole numbers, texts, and for a key in `lists` all its values in the order given.
 
-    Raises BadCase for another key that is given twice.
+    Raises BadCall for another key that is given twice.
     """
     found: dict[str, Value] = {}
     wrong = []
@@ -28,5 +28,5 @@ def keywords(options: Iterable[str], lists: Collection[str]) -> dict[str, Value]
         else:
             found[key] = int(text) if text.isdecimal() else text
     if wrong:
-        raise BadCase(wrong)
+        raise BadCall(wrong)
     return found

@@ -20,7 +20,7 @@ from pathlib import Path
 from coupler.commands.sweep.folder import Spec, ended, figures, read_spec, write_figures
 from coupler.commands.sweep.one import Process, make
 from coupler.commands.sweep.options import keywords
-from coupler.program.errors import BadCase, SurgebreakError
+from coupler.program.errors import BadCall, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import environment
 from coupler.program.quantities import counted
@@ -99,7 +99,7 @@ class Slurm:
             self._wait(waiting, tell)
 
     def _submit(self, ids: list[str]) -> dict[str, str]:
-        """The job of each run. Raises BadCase for unknown options, NoSlurm where sbatch refuses."""
+        """The job of each run. Raises BadCall for unknown options, NoSlurm where sbatch refuses."""
         import submitit
         from submitit.core.utils import FailedJobError
 
@@ -118,7 +118,7 @@ class Slurm:
             with executor.batch():
                 made = [executor.submit(Work(self.spec.folder, group)) for group in groups]
         except (ValueError, TypeError) as error:
-            raise BadCase([f"--option: {error}"]) from error
+            raise BadCall([f"--option: {error}"]) from error
         except FailedJobError as error:
             raise NoSlurm(f"sbatch refused the jobs: {error}") from error
         return {id: job.job_id for job, group in zip(made, groups) for id in group}
@@ -180,7 +180,7 @@ def in_queue(jobs: set[str]) -> set[str]:
 
 
 def cancel(spec: Spec, which: tuple[str, ...]) -> str:
-    """scancel of all jobs of a sweep, or of those that make some rows; what was done, in words. Raises BadCase."""
+    """scancel of all jobs of a sweep, or of those that make some rows; what was done, in words. Raises BadCall."""
     known = _known(spec)
     if which == ("all",):
         ids = list(known)
@@ -188,7 +188,7 @@ def cancel(spec: Spec, which: tuple[str, ...]) -> str:
         numbers = {str(row.number): row.id for row in spec.rows}
         wrong = [word for word in which if word not in numbers]
         if wrong:
-            raise BadCase([f"--cancel {wrong[0]}: no such row; there are 0 to {len(spec.rows) - 1}, or all"])
+            raise BadCall([f"--cancel {wrong[0]}: no such row; there are 0 to {len(spec.rows) - 1}, or all"])
         ids = [numbers[word] for word in which]
     jobs = sorted(in_queue({known[id] for id in ids if id in known}))
     if not jobs:

@@ -13,7 +13,7 @@ import tomllib
 from pydantic import ValidationError
 
 from coupler.case.sweep import NEEDS, Varied
-from coupler.program.errors import BadCase, did_you_mean
+from coupler.program.errors import BadCall, did_you_mean
 
 FORMS = "KEY=A,B,...  KEY=FROM:TO:STEPS  or  KEY=lognormal(median=..., dispersion=...)"
 
@@ -21,25 +21,25 @@ WITH_UNIT = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z%°]")
 
 
 def varied(text: str) -> Varied:
-    """The table that one --vary stands for. Raises BadCase."""
+    """The table that one --vary stands for. Raises BadCall."""
     key, sign, value = (part.strip() for part in text.partition("="))
     if not sign or not key or not value:
-        raise BadCase([f"--vary {text}: write {FORMS}"])
+        raise BadCall([f"--vary {text}: write {FORMS}"])
     content = _content(value, text)
     _refuse_mixed_units(content, text)
     try:
         return Varied.model_validate({"key": key, **content})
     except ValidationError as error:
-        raise BadCase([f"--vary {text}: {_said(item)}" for item in error.errors()]) from error
+        raise BadCall([f"--vary {text}: {_said(item)}" for item in error.errors()]) from error
 
 
 def _refuse_mixed_units(content: dict, text: str) -> None:
-    """Refuse `0.1,0.2 MPa`, which hardly means 0.1 Pa and 0.2 MPa. Raises BadCase."""
+    """Refuse `0.1,0.2 MPa`, which hardly means 0.1 Pa and 0.2 MPa. Raises BadCall."""
     given = content.get("values", tuple(content[name] for name in ("low", "high") if name in content))
     plain_numbers = [v for v in given if isinstance(v, int | float) and not isinstance(v, bool) and v]
     with_unit = [v for v in given if isinstance(v, str) and WITH_UNIT.match(v)]
     if plain_numbers and with_unit:
-        raise BadCase(
+        raise BadCall(
             [
                 f"--vary {text}: {plain_numbers[0]:g} has no unit, which means SI, but '{with_unit[0]}' has one; "
                 "write the unit at every value"
@@ -64,7 +64,7 @@ def _content(value: str, text: str) -> dict:
 
 def _distribution(kind: str, inner: str, text: str) -> dict:
     if kind not in NEEDS:
-        raise BadCase(
+        raise BadCall(
             [
                 f"--vary {text}: no distribution '{kind}'{did_you_mean(kind, NEEDS)}; there are {', '.join(NEEDS)}"
             ]
@@ -73,7 +73,7 @@ def _distribution(kind: str, inner: str, text: str) -> dict:
     for part in filter(None, (part.strip() for part in inner.split(","))):
         name, sign, value = (word.strip() for word in part.partition("="))
         if not sign:
-            raise BadCase(
+            raise BadCall(
                 [f"--vary {text}: '{part}': write NAME=NUMBER, for instance {' and '.join(NEEDS[kind][0])}"]
             )
         found[name] = plain(value)

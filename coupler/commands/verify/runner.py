@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from coupler.commands.verify.registry import NOT_COVERED, Check, Result, checks
-from coupler.program.errors import BadCase, did_you_mean
+from coupler.program.errors import BadCall, did_you_mean
 from coupler.program.process import rows_of_module
 
 TIME_LIMIT = {"S": 1800, "M": 2 * 3600, "L": 6 * 3600}
@@ -14,16 +14,16 @@ TIME_LIMIT = {"S": 1800, "M": 2 * 3600, "L": 6 * 3600}
 
 
 def chosen(ids: list[str], quick: bool) -> list[Check]:
-    """The cases asked for; all without ids; with quick only those of cost S. Raises BadCase for unknown ids, and where
+    """The cases asked for; all without ids; with quick only those of cost S. Raises BadCall for unknown ids, and where
     none is left."""
     known = checks()
     wrong = [_unknown(id, known) for id in ids if id.upper() not in known]
     if wrong:
-        raise BadCase(wrong)
+        raise BadCall(wrong)
     found = [known[id.upper()] for id in ids] if ids else list(known.values())
     left = [case for case in found if case.cost == "S" or not quick]
     if not left:
-        raise BadCase([f"--quick leaves out {', '.join(case.id for case in found)}: each takes minutes"])
+        raise BadCall([f"--quick leaves out {', '.join(case.id for case in found)}: each takes minutes"])
     return left
 
 

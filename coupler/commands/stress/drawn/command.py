@@ -16,29 +16,29 @@ from coupler.commands.stress.drawn.shrink import shrunk
 from coupler.commands.stress.drawn.trial import Trial, trial
 from coupler.commands.stress.registry import GROUPS, Outcome
 from coupler.commands.stress.report import FORM, HEAD, shown, totals
-from coupler.program.errors import BadCase, ExitCode
+from coupler.program.errors import BadCall, ExitCode
 
 ID = re.compile(r"R(\d+)-(\d+)", re.IGNORECASE)
 
 
 def are_drawn(words: list[str]) -> bool:
-    """Whether the words on the command line name drawn scenes. Raises BadCase where only some of them do."""
+    """Whether the words on the command line name drawn scenes. Raises BadCall where only some of them do."""
     drawn = [word for word in words if ID.fullmatch(word)]
     if drawn and len(drawn) < len(words):
         other = next(word for word in words if word not in drawn)
-        raise BadCase(
+        raise BadCall(
             [f"{drawn[0]}: a random scene, and {other} is none; give random scenes in a call of their own"]
         )
     return bool(drawn)
 
 
 def numbered(seed: int, count: int, first: int, groups: list[str]) -> Iterator[tuple[int, int]]:
-    """(seed, number) of `count` scenes from number `first` on, of these groups; of all without any. Raises BadCase."""
+    """(seed, number) of `count` scenes from number `first` on, of these groups; of all without any. Raises BadCall."""
     wrong = [
         f"{group}: unknown group; there are {', '.join(GROUPS)}" for group in groups if group not in GROUPS
     ]
     if wrong:
-        raise BadCase(wrong)
+        raise BadCall(wrong)
     number = first
     while count > 0:
         if not groups or group_of(Dice(seed, number)) in groups:
@@ -48,11 +48,11 @@ def numbered(seed: int, count: int, first: int, groups: list[str]) -> Iterator[t
 
 
 def named(words: list[str]) -> Iterator[tuple[int, int]]:
-    """(seed, number) of scenes R<seed>-<number>. Raises BadCase."""
+    """(seed, number) of scenes R<seed>-<number>. Raises BadCall."""
     for word in words:
         found = ID.fullmatch(word)
         if found is None:
-            raise BadCase([f"{word}: random scenes are called R<seed>-<number>, for instance R1-12"])
+            raise BadCall([f"{word}: random scenes are called R<seed>-<number>, for instance R1-12"])
         yield int(found[1]), int(found[2])
 
 
