@@ -290,7 +290,9 @@ class Sweep(Section):
         "the histories; all: everything",
     )
     quantity: tuple[SweepQuantity, ...] = Field(
-        (), description="what is read from every run; absent: the plain figures of run.json"
+        (),
+        description="what is read from every run; absent: the plain figures of run.json, with "
+        "the shares of the weight that left its place and that stays out of it",
     )
     free_field: tuple[Override, ...] = Field(
         (), description="further changes of the runs without structure, KEY=VALUE"

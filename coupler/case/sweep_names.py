@@ -23,12 +23,20 @@ PLAIN = {
     "time": ("time that was reached", "s"),
     "joints": ("joints at the start", ""),
     "joints_broken": ("joints broken", ""),
+    "weight_moved": ("share of the weight that left its place", ""),
+    "weight_out": ("share of the weight that stays out of its place", ""),
     "largest_water_force": (
         "largest force of the water on blocks that can move (all bodies if none can)",
         "N",
     ),
 }
-"""Figures of run.json that are read where [sweep] has no quantities: what they are, their unit."""
+"""Columns of a sweep whose [sweep] has no quantities, figures of run.json or of its verdict: what they are, unit."""
+OF_THE_VERDICT = ("weight_moved", "weight_out")
+
+
+def plain_figure(name: str) -> str:
+    """Where run.json has the figure of a column in PLAIN."""
+    return f"verdict.{name}" if name in OF_THE_VERDICT else name
 
 
 def sweep_problems(sweep: Sweep) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""Waves that come after the end of the run, or do not reach the structure before it."""
+"""Waves that come after the end of the run, do not reach the structure before it, or come back to their side."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterator
 
 from coupler.case.case import Case
-from coupler.checks.bores import bores, structure_of
+from coupler.checks.bores import Bore, against_wall, bores, structure_of
 from coupler.geometry.tank_mesh import floor_along
+
+BLOCKS = 0.25
+"""Share of the width of the tank from which a structure sends a bore back that is worth a remark."""
 
 
 def arrival_remarks(case: Case) -> Iterator[str]:
@@ -37,6 +40,31 @@ def arrival_remarks(case: Case) -> Iterator[str]:
     for bore in bores(case):
         if bore.depth_there > 0.0 and bore.arrival > end:
             yield _too_early(end, f"the bore from {bore.side}", bore.at, bore.arrival)
+        else:
+            yield from _comes_back(case, bore, end)
+
+
+def _comes_back(case: Case, bore: Bore, end: float) -> Iterator[str]:
+    """A bore that the structure, or the step that it stands on, sends back to a side that reflects it once more. It
+    runs back at u h/(h_w - h) where all is stopped, with h_w the depth at the wall, else slower."""
+    (spec,) = [s for s in case.water.inflow if s.side == bore.side]
+    if spec.absorbs:
+        return
+    across = 1 - "xy".index(bore.side[0])
+    _, low, high = structure_of(case)
+    share = (high[across] - low[across]) / (case.tank.upper[across] - case.tank.lower[across])
+    if bore.step == 0.0 and share < BLOCKS:
+        return
+    at_wall = against_wall(bore.depth, bore.velocity, case.case.gravity)
+    back = bore.velocity * bore.depth / (at_wall - bore.depth)
+    there = bore.arrival * (1.0 + bore.front / back)
+    if there < end:
+        what = f"the step before {bore.at}" if bore.step > 0.0 else f"'{bore.at}'"
+        yield (
+            f"what {what} sends back of the bore from {bore.side} may be at {bore.side} again from t = "
+            f"{there:.3g} s on, and the run ends at {end:g} s: this side holds level and velocity, so that it reflects "
+            "what comes back, as no sea does; absorbs = true of its inflow lets it leave, or take a longer tank"
+        )
 
 
 def _too_early(end: float, wave: str, body: str, arrival: float) -> str:

@@ -12,7 +12,7 @@ from coupler.case.types import Problem
 from coupler.checks.inflow_volumes import inflow_volume_problems
 from coupler.checks.inflows import inflow_remarks, side_problems, struck
 from coupler.geometry.cell_sizes import has_equal_cells, places_in_box, widest_cell
-from coupler.geometry.tank_mesh import floor_along, is_measured
+from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured
 from coupler.scene.build_water import SLACK, level_at_start
 
 UPWARDS = np.array([0.0, 0.0, 1.0])
@@ -57,6 +57,21 @@ def water_remarks(case: Case) -> Iterator[str]:
     """Water that the mesh does not resolve, and what inflows and seas do beside what they are meant for."""
     yield from thin_water_remarks(case)
     yield from inflow_remarks(case)
+    yield from _rough_remarks(case)
+
+
+def _rough_remarks(case: Case) -> Iterator[str]:
+    """Roughness that sticks out of the cells on it: the log law is that of water over it, not among it."""
+    k, tank = case.water.roughness if case.water else None, case.tank
+    if k is None or tank is None or not is_measured(tank):
+        return
+    cell = finest_cell(tank)
+    if k > cell:
+        yield (
+            f"water.roughness = {k:.3g} m is larger than the finest cells ({cell:.3g} m): the log law describes the "
+            "flow above the roughness, and in cells smaller than it friction grows without a limit as they are "
+            f"refined; where such cells lie on walls take them larger than {k:.2g} m, or a bed by water.manning"
+        )
 
 
 def _without_effect(case: Case) -> Iterator[Problem]:

@@ -28,6 +28,8 @@ from coupler.step.observe import joint_counts
 
 LONGEST_REST_STEP = 0.3
 FALL = "time.cfl at the speed of a free fall"
+LONG_SUBSTEPS = 10.0
+"""Processor time [s] of the substeps from which their saving is worth a remark."""
 NO_DAMAGE = 1e-12
 """Damage of joints that is round-off."""
 BYTES_PER_BLOCK = 60_000
@@ -72,6 +74,7 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     exact: with the exact frequency of the joints beside the bound that sets the substep (an eigenvalue problem) ·
     place: a directory on the disk that the results go to."""
     rows: list[Row] = []
+    remarks: list[str] = []
     cells = blocks = 0
     disk = 0.0
     interval = Schedule.of(case).interval
@@ -90,8 +93,10 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     if case.water:
         seconds += cost.SECONDS_OF_A_WATER + steps * cost.water_seconds(case, cells)
     if case.structure:
-        blocks, moving, substeps = _structure_rows(case, rows, exact)
-        seconds += cost.SECONDS_OF_A_STRUCTURE + cost.passes(case) * substeps
+        blocks, moving, of_substeps = _structure_rows(case, rows, steps, exact)
+        spent = cost.passes(case) * of_substeps
+        remarks += _sleep_remark(case, spent, seconds)
+        seconds += cost.SECONDS_OF_A_STRUCTURE + spent
         if case.water and moving:
             seconds += steps * cost.coupling_seconds(cells, moving)
         disk += DISK_BYTES_PER_BLOCK * blocks * (outputs + 1)
@@ -101,7 +106,7 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     rows += _time_rows(seconds)
     rows.append(Row("memory", memory(case, cells, blocks) / 1e6, "MB", "about"))
     rows.append(Row("disk", disk / 1e6, "MB", _disk_remark(disk, shutil.disk_usage(place).free)))
-    return Forecast(rows)
+    return Forecast(rows, tuple(remarks))
 
 
 def memory(case: Case, cells: int, blocks: int) -> float:
@@ -180,9 +185,24 @@ def _time_rows(seconds: float) -> Iterator[Row]:
     yield Row("wall time", wall, "s", beside if wall < 60.0 else f"{duration(wall)}, {beside}")
 
 
-def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int, float]:
-    """Rows of the structure; the number of its blocks, of those that can move, and the processor time [s] of their
-    substeps."""
+def _sleep_remark(case: Case, spent: float, else_spent: float) -> Iterator[str]:
+    """That buildings can sleep, where substeps of joined blocks take most of a run [s] in which water comes to them.
+
+    else_spent [s]: what the water and the start of the run take."""
+    sleeps = case.structure.sleep is not None
+    if sleeps or case.joints is None or case.water is None or spent < LONG_SUBSTEPS:
+        return
+    if spent > else_spent:
+        yield (
+            f"substeps of the blocks take about {duration(spent)} of it: with an empty section [structure.sleep] "
+            "buildings whose loads do not change make none, which saves about half where water reaches them late or "
+            "only a few of them; `surgebreak explain structure.sleep` says at what error"
+        )
+
+
+def _structure_rows(case: Case, rows: list[Row], steps: int, exact: bool) -> tuple[int, int, float]:
+    """Rows of the structure in a run of so many steps; the number of its blocks, of those that can move, and the
+    processor time [s] of their substeps."""
     from coupler.scene.build import build_structure
 
     structure = build_structure(case)
@@ -201,12 +221,14 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int,
         rows += [fastest] if fastest is not None else []
         if exact and structure.joints is not None:
             rows.append(_frequency_row(structure, limit.omega))
-        rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
+        # a step takes one substep at least
+        substeps = max(math.ceil(case.time.end / substep), steps)
+        rows.append(Row("substeps", substeps, "", "at least one a step" if substeps == steps else ""))
         if structure.joints is not None and case.structure.start == "settled":
             _row_at_rest(structure, rows)
         if case.water:
             rows += _air_rows(case, structure)
-        seconds = cost.structure_seconds(structure, math.ceil(case.time.end / substep))
+        seconds = cost.structure_seconds(structure, substeps)
         return structure.n, int((~structure.fixed).sum()), seconds
     finally:
         structure.close()

@@ -43,6 +43,19 @@ def test_a_wave_that_the_run_does_not_wait_for_is_remarked_on(wave, name):
     assert not list(arrival_remarks(made(7.0, wave, sections={})))
 
 
+def test_a_bore_that_comes_back_to_a_side_that_reflects_is_remarked_on():
+    """1 m over 0.5 m enters at 1.92 m/s, stands 1.68 m deep at a wall and so goes back at 1.92/0.68 = 2.8 m/s: 17.5 m
+    in 6.2 s after the 4.56 s of its way there. A post of a tenth of the width sends nothing back that matters."""
+    bore = {"kind": "bore", "ahead": 0.5, "level": 1.0}
+    assert not list(arrival_remarks(made(10.0, bore, still=0.5)))
+    (said,) = arrival_remarks(made(11.0, bore, still=0.5))
+    assert "sends back of the bore from x- may be at x- again from t = 10.8 s on" in said
+    assert "absorbs = true" in said
+    assert not list(arrival_remarks(made(11.0, bore | {"absorbs": True}, still=0.5)))
+    post = {"structure": {"block": [{"name": "post", "centre": [18, 1, 1], "size": [1, 0.2, 2]}]}}
+    assert not list(arrival_remarks(made(11.0, bore, still=0.5, sections=BOX | post)))
+
+
 def test_a_bore_that_the_run_does_not_wait_for_is_remarked_on():
     """Of 1 m over 0.5 m: its front runs at sqrt(g h₂ (h₁ + h₂)/(2 h₁)) = 3.84 m/s."""
     bore = {"kind": "bore", "ahead": 0.5, "level": 1.0}

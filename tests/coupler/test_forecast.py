@@ -36,6 +36,21 @@ stiffness = "1 MN/m"
 """
 
 
+HOUSE = (
+    WATER
+    + """
+[structure]
+[[structure.wall]]
+name = "wall"
+lower = [0.6, 0.1, 0]
+size = [0.05, 0.3, 0.4]
+block = [0.05, 0.1, 0.1]
+[contact]
+[joints]
+strength = "0.2 MPa"
+opening_at_failure = "0.2 mm"
+"""
+)
 BORE = """
 [[water.inflow]]
 kind = "bore"
@@ -113,3 +128,24 @@ def test_a_step_ends_at_each_written_state(tmp_path):
     """Steps of 10 ms at most between states 25 ms apart are three each: six, and not five."""
     (tmp_path / "case.toml").write_text(WATER, encoding="utf-8")
     assert forecast(load(tmp_path).case)["steps"] == 6
+
+
+def test_a_step_takes_one_substep_at_least(tmp_path):
+    """A box alone may take 0.8 ms a substep; steps of 0.1 ms are 500, and 63 substeps were forecast for them."""
+    text = (WATER + BLOCK).replace("step_max = 0.01", "step_max = 1e-4")
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    found = forecast(load(tmp_path).case)
+    assert found["steps"] == 500
+    assert found["substeps"] == 500
+
+
+def test_sleep_is_named_where_substeps_take_most_of_a_run(tmp_path):
+    (tmp_path / "case.toml").write_text(HOUSE, encoding="utf-8")
+    (said,) = forecast(load(tmp_path, ["time.end=20 s"]).case).remarks
+    assert "[structure.sleep]" in said
+    for less in (
+        ["time.end=0.1 s"],
+        ["time.end=20 s", "structure.sleep={}"],
+        ["time.end=20 s", "water=absent"],
+    ):
+        assert not forecast(load(tmp_path, less).case).remarks

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coupler.case.sweep import SweepQuantity
-from coupler.commands.sweep.quantities import read_quantity
+from coupler.case.sweep import Sweep, SweepQuantity
+from coupler.commands.sweep.quantities import asked, read_quantity
 from coupler.results.fields import BlockWriter
 from coupler.results.history import HistoryTable
 from coupler.run.directory import write_json
@@ -130,3 +130,19 @@ def test_a_quantity_has_the_unit_of_its_column_unless_another_is_given(tmp_path,
     assert found("pier_force_x", **more) == unit
     assert found("rate", **more) == {"N": "m3/s", "N s": "m3", "s": "s"}[unit]
     assert found("damage", **more) == {"N": "1", "N s": "s", "s": "s"}[unit]
+
+
+def test_a_sweep_without_quantities_tells_whether_loose_blocks_moved(tmp_path):
+    """They have no joints that could break: without the shares of the weight all rows looked alike."""
+    verdict = {
+        "name": "structure", "word": "moved", "state": "collapsed", "rule": "", "blocks": 4, "blocks_moved": 2,
+        "joints": 0, "joints_broken": 0, "area_broken": 0.0, "weight_moved": 0.5, "weight_out": 0.25,
+        "farthest": {"block": "a", "way": 1.0}, "first_break": None, "largest": {}, "bodies": [], "members": [],
+        "storeys": [], "displaced": {"blocks": 2, "first": 0.1, "list": []}, "hits": {"pairs": 0, "list": []},
+    }  # fmt: skip
+    figures = {"joints": 0, "joints_broken": 0, "verdict": verdict}
+    case = {"case": {"title": "t"}}
+    whole = SUMMARY | {"status": "done", "exit_reason": "", "figures": figures, "case": case}
+    write_json(tmp_path / "run.json", whole)
+    found = {q.name: read_quantity(tmp_path, q).value for q in asked(Sweep())}
+    assert (found["weight_moved"], found["weight_out"]) == (0.5, 0.25)

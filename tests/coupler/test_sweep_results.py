@@ -367,7 +367,12 @@ def test_reasons_to_doubt_runs_are_told_at_the_end_and_on_the_page(made, capsys)
 
 def test_runs_that_all_change_at_one_intensity_are_refused_in_words_that_fit_it():
     x = np.array([0.6, 0.9, 0.9, 1.2])
-    said = refusal(Runs(x, np.array([0, 0, 1, 1]), 0, 0, 0), [1], ["cracked"])
+    runs = Runs(x, np.array([0, 0, 1, 1]), 0, 0, 0)
+    assert "draw strengths" in refusal(runs, [1], ["cracked"], drawn=False)
+    said = refusal(runs, [1], ["cracked"], drawn=True)
+    assert said.endswith("(it would be 0); add runs at intensities around this one"), (
+        "strengths are drawn already"
+    )
     assert "no run below 0.9 reached 'cracked', every run above did, and of those at 0.9 some" in said
 
 

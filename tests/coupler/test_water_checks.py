@@ -569,3 +569,11 @@ def test_the_time_from_which_a_wave_is_not_under_way_at_the_start_is_said(wave, 
         flow = n_wave((1.0, 0.0, 0.0), 0.0, depth, wave["height"], 9.81, time)
         shares = [abs(flow.level(t) - depth) / wave["height"] for t in (0.0, -0.1, -1.0)]
     assert max(shares) == pytest.approx(0.05, rel=0.2 if wave.get("theory") == "grimshaw" else 0.02)
+
+
+def test_a_roughness_larger_than_the_cells_is_remarked_on():
+    """In cells of 0.1 m: the log law holds over the stones of a bed, and not among them."""
+    rough = {"walls": "friction", "roughness": 0.3}
+    (said,) = [text for text in remarks(case(rough)) if "roughness" in text]
+    assert "water.roughness = 0.3 m is larger than the finest cells" in said
+    assert not [text for text in remarks(case(rough | {"roughness": 0.01})) if "roughness" in text]

@@ -72,7 +72,8 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
     }
     kept, left_out = usable(runs, [s.name for s in f.state])
     result["left_out"] = left_out
-    why = refusal(runs, kept, [s.name for s in f.state])
+    drawn = bool(spec.sweep.seeds) or any(v.distribution for v in spec.sweep.vary)
+    why = refusal(runs, kept, [s.name for s in f.state], drawn)
     if why:
         return result | {"refused": why}
     state = _renumbered(runs.state, kept)
@@ -149,8 +150,8 @@ def usable(runs: Runs, names: list[str]) -> tuple[list[int], list[str]]:
     return kept, out
 
 
-def refusal(runs: Runs, kept: list[int], names: list[str]) -> str:
-    """Why no curve can be fitted; empty where one can."""
+def refusal(runs: Runs, kept: list[int], names: list[str], drawn: bool) -> str:
+    """Why no curve can be fitted; empty where one can. drawn: whether runs differ in more than the intensity."""
     if not kept:
         return "no state is reached by some of the runs and not by others; give intensities between"
     if len(np.unique(runs.x)) < 2:
@@ -164,10 +165,12 @@ def refusal(runs: Runs, kept: list[int], names: list[str]) -> str:
         else:
             where = f"no run up to {low:.4g} reached '{name}' and every run from {high:.4g} on did"
             more = "add runs between these two"
+        why = f"perfectly separated: {where}, so the dispersion has no likelihood maximum (it would be 0)"
+        if drawn:
+            return f"{why}; {more}"
         return (
-            f"perfectly separated: {where}, so the dispersion has no likelihood maximum (it would be 0). Runs that "
-            "differ in nothing but the intensity always are: draw strengths (sweep.vary with a distribution, or "
-            f"joints.distribution with sweep.seeds), or {more}"
+            f"{why}. Runs that differ in nothing but the intensity always are: draw strengths (sweep.vary with a "
+            f"distribution, or joints.distribution with sweep.seeds), or {more}"
         )
     return ""
 

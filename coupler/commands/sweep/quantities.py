@@ -12,7 +12,7 @@ import numpy as np
 from array_types import Array
 from coupler.case.formula import BadFormula, evaluate_columns
 from coupler.case.sweep import Sweep, SweepQuantity
-from coupler.case.sweep_names import PLAIN
+from coupler.case.sweep_names import PLAIN, plain_figure
 from coupler.commands.study.plan import fingerprint
 from coupler.commands.study.reading import Curve, NotRecorded, read, taken
 from coupler.program.errors import BadCase, NoRun, SurgebreakError, did_you_mean
@@ -40,11 +40,12 @@ class Reading:
 
 
 def asked(sweep: Sweep) -> tuple[SweepQuantity, ...]:
-    """The quantities of a sweep; without any, the plain figures of run.json."""
+    """The quantities of a sweep; without any, the plain figures of run.json and of its verdict."""
     if sweep.quantity:
         return sweep.quantity
     return tuple(
-        SweepQuantity(name=name, what=what, unit=unit, figure=name) for name, (what, unit) in PLAIN.items()
+        SweepQuantity(name=name, what=what, unit=unit, figure=plain_figure(name))
+        for name, (what, unit) in PLAIN.items()
     )
 
 
