@@ -11,7 +11,7 @@ from PIL import Image
 from coupler.commands.view.foam import FAST, TORN, differences, foam
 from coupler.program.process import run_module
 from coupler.program.provenance import ROOT
-from tests.coupler.synthetic_run import BOX_FACES, box_vertices, tank_mesh
+from tests.coupler.synthetic_run import BOX_FACES, box_vertices, tank_mesh, write_run
 
 NODES, CELLS = tank_mesh((4.0, 4.0, 4.0), 1.0)
 LEVEL = NODES[:, 2] - 2.3
@@ -101,6 +101,26 @@ def test_lines_of_a_caption_are_about_as_long_as_one_another(tmp_path):
     assert " ".join(lines) == title
     assert len(lines) == 2
     assert abs(len(lines[0]) - len(lines[1])) < 10
+
+
+def test_a_caption_of_several_lines_stands_above_the_tank(tmp_path):
+    """Its lower lines ran over the rim: room was kept for one of them."""
+    run = write_run(tmp_path / "run", [0.0], cell=4.0)
+    (run / "run.json").write_text(json.dumps({"case": {"case": {"title": "A long title of a case " * 3}}}))
+    code = (
+        "import itertools; from coupler.commands.view.run_files import open_run;"
+        "from coupler.commands.view.scene import Scene;"
+        f"scene = Scene(open_run({str(run)!r}), (640, 360), soft=False); scene.draw(0.0);"
+        "text, seen = scene.plotter.actors['caption'], scene.plotter.renderer; size = [0.0, 0.0];"
+        "text.GetSize(seen, size); scene.picture();"
+        "places = [];\n"
+        "for p in itertools.product(*zip(scene.lower, scene.upper)):\n"
+        "    seen.SetWorldPoint(*p, 1.0); seen.WorldToDisplay(); places.append(seen.GetDisplayPoint()[1])\n"
+        "print(len(scene.caption.splitlines()), 360 * 0.985 - size[1], max(places)); scene.close()"
+    )
+    lines, below, rim = map(float, told(code).split())
+    assert lines == 3
+    assert rim < below
 
 
 def test_the_picture_of_a_case_has_a_legend_that_can_be_read(tmp_path):

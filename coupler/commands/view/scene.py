@@ -115,7 +115,7 @@ class Scene:
         )  # fmt: skip
         lettered(text.prop)
         caption = self.plotter.add_text(
-            self.caption, name="caption", position=(0.985, 0.985),
+            self.caption, name="caption", position=(0.985, 1.0 - CAPTION_TOP),
             viewport=True, font_size=self._points(7), color=palette.TANK, render=False,
         )  # fmt: skip
         lettered(caption.prop)
@@ -135,6 +135,9 @@ class Scene:
     def _set_camera(self, azimuth, elevation, eye):
         angle = angle_of(azimuth, elevation)
         below = 0.055 if angle == FAR else 0.0  # the label of the scale bar
+        above = CAPTION_TOP + CAPTION_LINE * self._points(7) / self.size[1] * (
+            len(self.caption.splitlines()) + 0.5
+        )
         view = eye or frame(
             self.lower,
             self.upper,
@@ -142,7 +145,7 @@ class Scene:
             azimuth,
             elevation,
             angle,
-            margin=(0.04, 0.04, 0.095 + below + BAR * self.letters, 0.05),
+            margin=(0.04, 0.04, 0.095 + below + BAR * self.letters, max(0.05, above)),
         )
         camera = self.plotter.camera
         camera.position, camera.focal_point, camera.up = view.position, view.focus, view.up
@@ -339,6 +342,8 @@ class Scene:
 
 CAPTION_LETTERS = 31
 """Letters in a line of the caption per width of one picture height, so that the caption ends beside the time."""
+CAPTION_TOP, CAPTION_LINE = 0.015, 2.05
+"""Where the caption begins below the top of a picture, as share of its height; pixels of a line per point."""
 
 
 def camera_inside(run, azimuth):
