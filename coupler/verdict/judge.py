@@ -53,9 +53,14 @@ def verdict(structure: Structure, watch: Watch) -> dict:
         "order": [m["name"] for m in sorted(_broken(members), key=lambda m: m["first_break"]["time"])],
         "displaced": _displaced(structure, watch, away, rocks),
         "leaving": _leaving(structure, watch),
-        "rising": watch.trend.rising(),
+        "rising": watch.trend.rising(_weight(structure, watch)),
         "hits": _hits(structure, watch),
     }
+
+
+def _weight(structure: Structure, watch: Watch) -> float:
+    """Weight [N] of the blocks that the verdict is about."""
+    return float(structure.mass[watch.judged].sum() * np.linalg.norm(structure.gravity))
 
 
 def _out_of_place(structure: Structure, watch: Watch) -> tuple[Array, Array]:
