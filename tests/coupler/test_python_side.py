@@ -1,5 +1,7 @@
 """`import surgebreak`: a case run by a script is what the command makes of it, and what is read back is what ran."""
 
+import ast
+import importlib
 import shutil
 import subprocess
 import sys
@@ -287,6 +289,26 @@ def test_water_read_back_is_hydrostatic_and_has_a_mesh_for_pyvista(tmp_path):
 def test_vtk_is_refused_beside_yade_with_a_way_out(ran):
     with pytest.raises(ImportError, match="process of their own"):
         ran[0].blocks().mesh()
+
+
+def test_type_checkers_find_the_same_names():
+    """They read the stubs, since a single module that is installed has no place for `py.typed`. Each name there has to
+    stand for the object that a script gets."""
+    stubs = ast.parse((ROOT / "surgebreak-stubs" / "__init__.pyi").read_text(encoding="utf-8"))
+    imported = [node for node in stubs.body if isinstance(node, ast.ImportFrom)]
+    assigned = {node.targets[0].id: node.value for node in stubs.body if isinstance(node, ast.Assign)}
+    names = {name.asname or name.name for node in imported for name in node.names}
+    assert sorted(names | {"load", "open"}) == sorted(surgebreak.__all__)
+    assert ast.literal_eval(assigned.pop("__all__")) == surgebreak.__all__
+    assert {name: ast.unparse(value) for name, value in assigned.items()} == {
+        "load": "Case.load",
+        "open": "Run",
+    }
+    for node in imported:
+        for name in node.names:
+            package = importlib.import_module(node.module)
+            there = getattr(package, name.name, None) or importlib.import_module(f"{node.module}.{name.name}")
+            assert getattr(surgebreak, name.asname or name.name) is there
 
 
 def test_every_public_name_is_there_and_says_what_it_is():
