@@ -15,7 +15,7 @@ from coupler.api.execution import resume
 from coupler.api.step import Step
 from coupler.program.errors import NoRun, SurgebreakError, UnknownName, did_you_mean
 from coupler.program.extras import need
-from coupler.program.process import run_module, trouble, was_killed
+from coupler.program.process import run_module, status_of, trouble
 from coupler.results import vtkhdf
 from coupler.results.history import History, read_history
 from coupler.run.summary import read_summary
@@ -116,7 +116,7 @@ class Run:
     @property
     def status(self) -> str:
         """done, running, killed, stopped, diverged, crashed or bad_case."""
-        return "killed" if was_killed(self.summary) else str(self.summary["status"])
+        return status_of(self.summary)
 
     @property
     def reason(self) -> str:

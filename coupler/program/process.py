@@ -76,6 +76,11 @@ def environment() -> dict[str, str]:
     return found
 
 
+def status_of(summary: dict) -> str:
+    """The status in run.json (its content), but "killed" where `was_killed` says so."""
+    return "killed" if was_killed(summary) else str(summary["status"])
+
+
 def was_killed(summary: dict) -> bool:
     """Whether run.json (its content) says "running" although its process is gone: it could not record its end.
 

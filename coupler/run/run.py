@@ -27,7 +27,7 @@ from coupler.run.within_step import LongSteps, StepLeft
 from coupler.scene.build import Scene, build, limits_of
 from coupler.step.limits import LimitReached, Limits, Stopped, check_air, check_defect, check_overlap
 from coupler.step.observe import joint_counts, size
-from coupler.step.step_limits import check_step
+from coupler.step.step_limits import check_step, volume_error
 from kernels.memory import keep_memory
 
 MOST_CLOSED = 3
@@ -383,15 +383,11 @@ def _reported(case: Case, coupling, record, watch) -> dict[str, str]:
         if len(record.load):
             whose, force = _force(case, record, watch)
             reported[f"force on {whose}"] = newtons(force)
-        reported["volume"] = signed_percent(_volume_error(coupling))
+        reported["volume"] = signed_percent(volume_error(coupling))
     if coupling.coupled:
         reported["defect"] = f"{record.defect:.1e}"
     reported["energy"] = f"{record.balance.energy_error:.2%}"
     return reported
-
-
-def _volume_error(coupling) -> float:
-    return 0.0 if coupling.water is None else coupling.water.volume_error()
 
 
 def _stop_reason(clock: Clock, limits: Limits, reporter) -> str | None:

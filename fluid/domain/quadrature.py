@@ -1,4 +1,4 @@
-"""Four-point rules on the fluid part of each cell, and three-point rules on the wetted surface.
+"""Four-point rules on the fluid part of each cell.
 
 A part with volume V, centroid c and second moment S (about c) gets points with equal positive weights V/4
 
@@ -71,17 +71,3 @@ def cell_basis(domain) -> CellBasis:
         domain.nodes.T.copy(), domain.cells.T.astype(np.int64, order="C"), sort_t=False, validate=False
     )
     return CellBasis(mesh, ElementTetP1(), quadrature=quadrature_rule(domain))
-
-
-def surface_basis(domain) -> tuple[CellBasis, Array]:
-    """scikit-fem basis on the wetted polygons (one "cell" per polygon, three points) and the normals
-    (3, S, 3) out of the bodies, to be passed to a form by keyword."""
-    cells = domain.cells[domain.face_cell]
-    corners = domain.nodes[cells]
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    offset = np.swapaxes(domain.face_points - corners[:, :1], 1, 2)
-    X = np.moveaxis(np.linalg.solve(edges, offset), 1, 0)
-    W = np.repeat((domain.face_area / 3 / np.abs(np.linalg.det(edges)))[:, None], 3, axis=1)
-    mesh = MeshTet(domain.nodes.T.copy(), cells.T.astype(np.int64, order="C"), sort_t=False, validate=False)
-    basis = CellBasis(mesh, ElementTetP1(), quadrature=(np.ascontiguousarray(X), W))
-    return basis, np.repeat(domain.face_normal.T[:, :, None], 3, axis=2)

@@ -6,10 +6,10 @@ Those that the step itself assembles (stabilised transport) are in `fluid.transp
 from __future__ import annotations
 
 import numpy as np
-from skfem import BilinearForm, CellBasis, ElementTetP1, ElementVector, LinearForm
+from skfem import BilinearForm, CellBasis, ElementTetP1, ElementVector, LinearForm, MeshTet
 from skfem.helpers import ddot, div, dot, grad, sym_grad
 
-from fluid.domain.quadrature import quadrature_rule, surface_basis
+from fluid.domain.quadrature import quadrature_rule
 from fluid.transport.forms import _mesh
 
 
@@ -88,6 +88,20 @@ def vector_basis_of(domain) -> CellBasis:
     return CellBasis(
         _mesh(domain.nodes, domain.cells), ElementVector(ElementTetP1()), quadrature=quadrature_rule(domain)
     )
+
+
+def surface_basis(domain):
+    """scikit-fem basis on the wetted polygons (one "cell" per polygon, three points) and the normals
+    (3, S, 3) out of the bodies, to be passed to a form by keyword."""
+    cells = domain.cells[domain.face_cell]
+    corners = domain.nodes[cells]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    offset = np.swapaxes(domain.face_points - corners[:, :1], 1, 2)
+    X = np.moveaxis(np.linalg.solve(edges, offset), 1, 0)
+    W = np.repeat((domain.face_area / 3 / np.abs(np.linalg.det(edges)))[:, None], 3, axis=1)
+    mesh = MeshTet(domain.nodes.T.copy(), cells.T.astype(np.int64, order="C"), sort_t=False, validate=False)
+    basis = CellBasis(mesh, ElementTetP1(), quadrature=(np.ascontiguousarray(X), W))
+    return basis, np.repeat(domain.face_normal.T[:, :, None], 3, axis=2)
 
 
 def vector_surface_basis_of(domain):

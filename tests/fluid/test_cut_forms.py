@@ -7,10 +7,10 @@ from skfem.helpers import dot, grad
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
-from fluid.domain.quadrature import cell_basis, surface_basis
+from fluid.domain.quadrature import cell_basis
 from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradients
-from tests.fluid import solid_modeller
+from tests.fluid import reference_forms, solid_modeller
 from tests.fluid.test_cut_cells import anywhere, cell, in_special_place
 
 MIXED = [(i, j) for i in range(3) for j in range(3)]
@@ -96,7 +96,7 @@ def test_surface_forms():
         domain, water = single_cell(seed, anywhere)
         if len(domain.face_cell) == 0:
             continue
-        basis, normal = surface_basis(domain)
+        basis, normal = reference_forms.surface_basis(domain)
         mass, flux = exact_surface(domain, water)
         ours = BilinearForm(lambda u, v, w: u * v).assemble(basis).toarray()
         np.testing.assert_allclose(ours, mass, atol=1e-13)

@@ -11,7 +11,6 @@ from skfem import asm
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.moments import nodal_water
 from fluid.domain.physical_domain import cut_domain, wetted_coupling
-from fluid.domain.quadrature import surface_basis
 from fluid.domain.topology import Graph, Topology
 from fluid.mesh.background import Background, box_mesh
 from fluid.numerics.solve import solve
@@ -222,7 +221,7 @@ def test_stress_on_wetted_faces(n, seed, covers):
 
 def _hats(domain):
     """Hat functions (4, S, 3) at the points of the wetted polygons, from scikit-fem."""
-    basis, _ = surface_basis(domain)
+    basis, _ = reference_forms.surface_basis(domain)
     return np.array([np.asarray(field[0]) for field in basis.basis])
 
 
@@ -233,7 +232,7 @@ def test_coupling_of_every_body(n, seed, covers):
     domain = cut(n, seed, covers)
     if len(domain.face_cell) == 0:
         return
-    basis, normal = surface_basis(domain)
+    basis, normal = reference_forms.surface_basis(domain)
     G = wetted_coupling(domain).toarray()[: basis.N]
     scale = np.abs(G).max()
     for body in range(domain.n_bodies):

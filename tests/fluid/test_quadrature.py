@@ -8,9 +8,10 @@ from skfem.helpers import dot, grad
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain, wetted_coupling
-from fluid.domain.quadrature import cell_basis, quadrature_rule, surface_basis
+from fluid.domain.quadrature import cell_basis, quadrature_rule
 from fluid.mesh.background import box_mesh
 from fluid.mesh.gradients import gradients
+from tests.fluid import reference_forms
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)
 BODIES = ConvexBodies.boxes(
@@ -82,7 +83,7 @@ def test_scikit_fem_mass_gives_the_moments_of_the_water(domain):
 
 def test_scikit_fem_surface_form_equals_the_coupling(domain):
     """∫ N_i n_z dA over all wetted polygons is the sum of the third columns of G."""
-    basis, normal = surface_basis(domain)
+    basis, normal = reference_forms.surface_basis(domain)
     force = LinearForm(lambda v, w: v * w["n"][2]).assemble(basis, n=normal)
     G = wetted_coupling(domain)
     np.testing.assert_allclose(force, np.asarray(G[:, 2::6].sum(axis=1)).ravel(), atol=1e-15)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from array_types import Array
-from coupler.program.process import was_killed
+from coupler.program.process import status_of
 from coupler.program.quantities import as_said, percent
 from coupler.results.history import BadTable, History, by_block, read_history
 
@@ -50,7 +50,7 @@ class Run:
     @property
     def status(self) -> str:
         """How it ended."""
-        return "killed" if was_killed(self.summary) else str(self.summary["status"])
+        return status_of(self.summary)
 
     def history(self, table: str) -> History | None:
         """A history table with at least one row; None without."""
