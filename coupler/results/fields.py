@@ -15,6 +15,9 @@ from coupler.results import vtkhdf
 from coupler.results.storage import finite, reserve, rows
 
 TETRAHEDRON = 10  # VTK's cell type
+GROWTH = 16
+"""A mesh around blocks that come apart gains a fiftieth of its cells; where it needs a second chunk, that is compressed
+whole for a few rows."""
 NO_CELLS = (
     "Vertices",
     "Lines",
@@ -75,8 +78,9 @@ class WaterWriter:
                 self._place = _write_grid(root, nodes - self.origin, cells)
             k = vtkhdf.count(root)
             vtkhdf.write_offsets(root["Steps"], k, **self._place)
-            vtkhdf.write_data(root, "PointData", k, point)
-            vtkhdf.write_data(root, "CellData", k, cell, again)
+            of_points, of_cells = root["Points"].chunks[0], root["Types"].chunks[0]
+            vtkhdf.write_data(root, "PointData", k, point, chunk=of_points)
+            vtkhdf.write_data(root, "CellData", k, cell, again, chunk=of_cells)
             vtkhdf.publish(file, k, time)
         self._geometry, self._last_time, self._of_cells = (nodes, cells), time, dict(cell_data)
 
@@ -116,12 +120,13 @@ def last_time(path):
 
 
 def _create_grid(root, nodes, cells):
-    """Empty arrays of an unstructured grid; a chunk holds the first mesh, and a larger one takes several."""
-    m = max(1, len(cells))
-    vtkhdf.growing(root, "Points", np.empty((len(nodes), 3), np.float32))
-    vtkhdf.growing(root, "Connectivity", np.empty(4 * m, np.int32))
-    vtkhdf.growing(root, "Types", np.empty(m, np.uint8))
-    vtkhdf.growing(root, "Offsets", np.empty(m + 1, np.int32))
+    """Empty arrays of an unstructured grid; a chunk holds a mesh larger than the first one by 1/GROWTH, and a still
+    larger mesh takes several."""
+    n, m = (max(1, rows + rows // GROWTH) for rows in (len(nodes), len(cells)))
+    vtkhdf.growing(root, "Points", np.empty((0, 3), np.float32), n)
+    vtkhdf.growing(root, "Connectivity", np.empty(0, np.int32), 4 * m)
+    vtkhdf.growing(root, "Types", np.empty(0, np.uint8), m)
+    vtkhdf.growing(root, "Offsets", np.empty(0, np.int32), m + 1)
     for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
         vtkhdf.table(root, name)
     root.create_group("PointData")

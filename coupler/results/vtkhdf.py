@@ -76,10 +76,10 @@ def table(group, name, dtype=np.int64, width=None):
     )
 
 
-def growing(group, name, first):
-    """A compressed growing array shaped and typed like `first` (n, ...); one chunk holds n rows."""
+def growing(group, name, first, chunk=None):
+    """A compressed growing array shaped and typed like `first` (n, ...); chunk: rows that one holds, None: n."""
     tail = first.shape[1:]
-    chunk = max(1, len(first))
+    chunk = max(1, len(first)) if chunk is None else chunk
     return group.create_dataset(
         name,
         shape=(0, *tail),
@@ -123,15 +123,16 @@ def write_offsets(steps, k, part, point, cell, connectivity):
     set_row(steps["ConnectivityIdOffsets"], k, connectivity)
 
 
-def write_data(root, kind, k, values, again=()):
+def write_data(root, kind, k, values, again=(), chunk=None):
     """Append the arrays of one step to /VTKHDF/PointData or CellData (`kind`), and note where they begin.
 
-    Names in `again` are the same as in the step before: what that one points at is pointed at again.
+    Names in `again` are the same as in the step before: what that one points at is pointed at again. chunk: see
+    `growing`.
     """
     offsets = root["Steps"][kind + "Offsets"]
     for name, array in values.items():
         if name not in root[kind]:
-            growing(root[kind], name, array)
+            growing(root[kind], name, array, chunk)
             table(offsets, name)
         known = name in again and k > 0
         set_row(offsets[name], k, offsets[name][k - 1] if known else extend(root[kind][name], array))
