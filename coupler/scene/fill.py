@@ -141,12 +141,14 @@ class _Corners:
         """Nodes (N,) bool with one of the points `found` (bool) in a cell around them, or around their neighbours: a
         plane is one in the nodes that a solid covers, too."""
         d, n = self._domain, len(self._domain.nodes)
-        within = (found[:n][d.cells] & self._shown).any(axis=1)
+        within = np.zeros(len(d.cells), bool)
+        for a in range(4):
+            within |= found[d.cells[:, a]] & self._shown[:, a]
         np.logical_or.at(within, d.face_cell, found[n:].reshape(len(d.face_cell), -1).any(axis=1))
         for _ in range(2):
             nodes = np.zeros(n, bool)
             nodes[d.cells[within]] = True
-            within = nodes[d.cells].any(axis=1)
+            within = _any_at(d.cells, nodes)
         return nodes
 
 
@@ -194,6 +196,15 @@ def _through_solids(domain, top: float, seen, slack: float) -> Array:
         found[cells[reached[cells].any(axis=1)]] = True
         reached = seen | found
     return found
+
+
+def _any_at(cells, found) -> Array:
+    """Cells (M,) bool with one of the nodes `found` (N,) bool: corner by corner, which takes a quarter of the time of
+    all four at once."""
+    within = found[cells[:, 0]]
+    for a in range(1, 4):
+        within |= found[cells[:, a]]
+    return within
 
 
 def _behind(domain) -> Array:
@@ -319,7 +330,7 @@ class _Faces(NamedTuple):
         """Those of the nodes `ending` (N,) bool, at which the side seems to end, that have no face along it around
         them, looking outward (1) or inward (-1), but cells with nodes `beyond` (N,) bool."""
         d, found = self.domain, np.zeros(len(ending), bool)
-        cells = d.cells[ending[d.cells].any(axis=1)]
+        cells = d.cells[_any_at(d.cells, ending)]
         if len(cells) == 0:
             return found
         found[cells[beyond[cells].any(axis=1)]] = True
@@ -393,7 +404,10 @@ def _side(s, s_low, s_high, cut_inner, cut_outer, faces: _Faces) -> Array:
 
 def _cell_edge(mesh) -> float:
     """Longest side of the bounding boxes of the cells, the typical one [m]."""
-    longest = [np.ptp(mesh.nodes[mesh.cells[some]], axis=1).max(axis=1) for some in spans(len(mesh.cells))]
+    longest = []
+    for some in spans(len(mesh.cells)):
+        low, high = _extent(mesh.nodes, mesh.cells[some])
+        longest.append((high - low).max(axis=1))
     return float(np.median(np.concatenate(longest)))
 
 
@@ -402,8 +416,15 @@ def _relative_size(mesh) -> Array:
     return mesh.node_size / np.median(mesh.local_size)
 
 
-def _extent(points) -> tuple[Array, Array]:
-    return points.min(axis=1), points.max(axis=1)
+def _extent(nodes, cells) -> tuple[Array, Array]:
+    """Bounds (m, 3) of the corners of cells (m, 4), corner by corner."""
+    low = nodes[cells[:, 0]]
+    high = low.copy()
+    for a in range(1, 4):
+        corner = nodes[cells[:, a]]
+        np.minimum(low, corner, out=low)
+        np.maximum(high, corner, out=high)
+    return low, high
 
 
 def _fluid_extent(domain) -> tuple[Array, Array, Array]:
@@ -413,9 +434,9 @@ def _fluid_extent(domain) -> tuple[Array, Array, Array]:
     d = domain
     cut = np.flatnonzero(d.is_cut)
     corners = d.nodes[d.cells[cut]]
-    low, high = _extent(corners)
+    low, high = _extent(d.nodes, d.cells[cut])
     points = part_points(corners, d.volume[cut], d.centroid_of(cut), d.second_of(cut))
-    part_low, part_high = _extent(points)
+    part_low, part_high = points.min(axis=1), points.max(axis=1)
     at = np.searchsorted(cut, d.face_cell)
     ours = np.flatnonzero(d.is_cut[d.face_cell])  # others touch a cell of which nothing is cut off
     np.minimum.at(part_low, at[ours], d.face_corners[ours].min(axis=1))
@@ -431,7 +452,7 @@ def _reach(nodes, cells, cut=NO_CELLS, cut_low=NO_BOUNDS, cut_high=NO_BOUNDS) ->
     given."""
     node_low, node_high = np.full(nodes.shape, np.inf), np.full(nodes.shape, -np.inf)
     for some in spans(len(cells)):
-        low, high = _extent(nodes[cells[some]])
+        low, high = _extent(nodes, cells[some])
         given = slice(*np.searchsorted(cut, [some.start, some.stop]))
         low[cut[given] - some.start], high[cut[given] - some.start] = cut_low[given], cut_high[given]
         for a in range(4):
