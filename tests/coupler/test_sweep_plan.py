@@ -5,7 +5,7 @@ import pytest
 
 from coupler.checks.read_case import load
 from coupler.commands.sweep.plan import make_plan
-from coupler.program.errors import BadCase
+from coupler.program.errors import BadCall, BadCase
 from yade_scripts.joints import outside_laws
 
 from .arm import CASE
@@ -467,11 +467,14 @@ def test_mistakes_are_reported_with_file_and_key(case, sweep, says):
         ("joints.strength=0.1,0.2 MPa", "0.1 has no unit, which means SI, but '0.2 MPa' has one"),
         ("joints.strength=0.1 MPa:0.5:5", "write the unit at every value"),
         ("joints.strenght=1,2", "did you mean 'joints.strength'"),
+        ("joints.strength=1 MPa:2 MPa", "a grid is FROM:TO:STEPS"),
+        ("joints.strength=1 MPa:2 MPa:2.5", "a grid is FROM:TO:STEPS"),
     ],
 )
 def test_mistakes_of_vary_name_it(case, vary, says):
-    with pytest.raises(BadCase) as reported:
+    with pytest.raises(BadCall) as reported:
         make_plan(case(), [vary])
+    assert str(reported.value).startswith(f"--vary {vary}: ")
     assert says in str(reported.value)
 
 

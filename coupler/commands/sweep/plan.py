@@ -30,7 +30,7 @@ from coupler.commands.sweep.quantities import asked
 from coupler.commands.sweep.table_in import InputTable, read_table
 from coupler.commands.sweep.vary import varied
 from coupler.geometry.tank_regions import ALL
-from coupler.program.errors import BadCase, UnitError
+from coupler.program.errors import BadCall, BadCase, UnitError
 
 OFF = ("structure", "contact", "joints", "motion", "verdict")
 """Sections that are left out of the run without structure."""
@@ -90,6 +90,7 @@ def make_plan(place: Path, vary: Iterable[str] = (), overrides: Iterable[str] = 
     """
     overrides = tuple(overrides)
     file = load(place, overrides)
+    vary = tuple(vary)
     sweep = _with(file.case.sweep or Sweep(), vary, overrides)
     if not (sweep.vary or sweep.table or sweep.repeats > 1):
         raise BadCase(
@@ -98,12 +99,16 @@ def make_plan(place: Path, vary: Iterable[str] = (), overrides: Iterable[str] = 
                 "KEY=A,B,...; `surgebreak explain sweep` says how"
             ]
         )
-    wrong = [
-        f"{file.path}: {shown(path)}: {text}"
-        for path, text in (*sweep_problems(sweep), *design_problems(sweep))
-    ]
+    own = len(sweep.vary) - len(vary)
+    wrong, of_call = [], 0
+    for path, text in dict.fromkeys((*sweep_problems(sweep), *design_problems(sweep))):
+        given = path[:2] == ("sweep", "vary") and len(path) > 2 and int(path[2]) >= own
+        of_call += given
+        wrong.append(
+            f"--vary {vary[int(path[2]) - own]}: {text}" if given else f"{file.path}: {shown(path)}: {text}"
+        )
     if wrong:
-        raise BadCase(dict.fromkeys(wrong))
+        raise (BadCall if of_call == len(wrong) else BadCase)(dict.fromkeys(wrong))
     return _Planner(file, sweep).plan()
 
 

@@ -17,6 +17,7 @@ from coupler.program.errors import BadCall, did_you_mean
 
 FORMS = "KEY=A,B,...  KEY=FROM:TO:STEPS  or  KEY=lognormal(median=..., dispersion=...)"
 
+NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z%°]*\d?")
 WITH_UNIT = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z%°]")
 
 
@@ -59,6 +60,8 @@ def _content(value: str, text: str) -> dict:
     grid = [part.strip() for part in value.split(":")]
     if len(grid) == 3 and grid[2].isdecimal():
         return {"low": plain(grid[0]), "high": plain(grid[1]), "steps": int(grid[2])}
+    if len(grid) > 1 and all(NUMBER.fullmatch(part) for part in grid):
+        raise BadCall([f"--vary {text}: a grid is FROM:TO:STEPS, two values and a whole number of them"])
     return {"values": tuple(_listed(value))}
 
 
