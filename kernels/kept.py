@@ -4,6 +4,10 @@ Numba keeps a kernel twice, as machine code and as code of LLVM that goes into k
 whenever it loads one; that takes a third of the time, for nothing unless something is compiled with it. Here the second
 is read when it is asked for. Numba looks in it, too, for what the machine code contains, whose own table of names says
 the same.
+
+Before it looks for a kernel, Numba also loads all that it knows of Python and NumPy. Only the compiler needs that, and
+loads it itself where it has to compile; it takes longer than to read all kernels of a run. What kernels call at run
+time, to make arrays, is set up here.
 """
 
 from __future__ import annotations
@@ -11,7 +15,9 @@ from __future__ import annotations
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core.caching import Cache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.runtime import rtsys
 
 
 class KeptLibrary(JITCodeLibrary):
@@ -46,6 +52,14 @@ class KeptLibrary(JITCodeLibrary):
         return super()._get_module_for_linking()
 
 
+def load_overload(cache: Any, sig: Any, target_context: Any) -> Any:
+    """What a cache of Numba holds of a kernel for the types of its arguments; None: nothing."""
+    rtsys.initialize(target_context)
+    with cache._guard_against_spurious_io_errors():
+        return cache._load_overload(sig, target_context)
+
+
 def read_less() -> None:
     """From now on."""
     JITCPUCodegen._library_class = KeptLibrary
+    Cache.load_overload = load_overload  # type: ignore[method-assign]

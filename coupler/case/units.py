@@ -2,7 +2,8 @@
 
     to_si("24 kN/m3", "N/m3") = 24000.0        to_si(24000, "N/m3") = 24000.0
 
-Units are read by pint, which is imported only when a value is text. A digit behind a letter is a power
+Units that most cases have are in a table (`COMMON`). Others are read by pint, which takes half a second of processor
+time to begin and is imported only then. A digit behind a letter is a power
 (`kg/m3`, `m/s2`, `s-1`), which pint itself does not read; `kg/m³` is the same.
 """
 
@@ -45,6 +46,27 @@ LEAST, MOST = 1e-30, 1e30
 """Sizes of numbers, zero aside, with whose products and powers the program can still count."""
 LONGEST = 100
 """Largest number of characters in the text of a quantity."""
+
+COMMON = {
+    "": {"%": 0.01, "": 1.0},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3},
+    "m2": {"m2": 1.0},
+    "m3": {"m3": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "1/s": {"1/s": 1.0, "Hz": 1.0},
+    "kg": {"kg": 1.0, "g": 1e-3, "t": 1e3},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2},
+    "m/s2": {"m/s2": 1.0, "mm/s2": 1e-3},
+    "kg/m3": {"kg/m3": 1.0, "t/m3": 1e3},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "kN/m2": 1e3, "N/mm2": 1e6},
+    "Pa s": {"Pa s": 1.0},
+    "N": {"N": 1.0, "kN": 1e3, "MN": 1e6},
+    "N/m": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "GN/m": 1e9, "N/mm": 1e3},
+    "J": {"J": 1.0, "kJ": 1e3},
+    "rad": {"rad": 1.0, "deg": 0.017453292519943295},
+    "rad/s": {"rad/s": 1.0},
+}
+"""Factors from texts of units to the unit of the case file, with the bits that pint finds."""
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 _COMMA = re.compile(r",(\d+)")
@@ -131,8 +153,16 @@ def _from_text(text: str, unit: str) -> float:
     return number * _factor(given, unit, text)
 
 
-@lru_cache(maxsize=256)
 def _factor(given: str, unit: str, value: str) -> float:
+    known = COMMON[unit].get(given)
+    return factor_by_pint(given, unit, value) if known is None else known
+
+
+@lru_cache(maxsize=256)
+def factor_by_pint(given: str, unit: str, value: str) -> float:
+    """Factor from a text of a unit to `unit` of the case file.
+
+    Raises UnitError, naming the value, where the text is no unit or one of another kind."""
     import pint
 
     registry = _registry()

@@ -450,12 +450,14 @@ def _fluid_extent(domain) -> tuple[Array, Array, Array]:
 def _reach(nodes, cells, cut=NO_CELLS, cut_low=NO_BOUNDS, cut_high=NO_BOUNDS) -> tuple[Array, Array]:
     """Lower and upper bounds (N, 3) of the cells around every node; those of some cells `cut` (n,), in order, are
     given."""
-    node_low, node_high = np.full(nodes.shape, np.inf), np.full(nodes.shape, -np.inf)
+    node_low, node_high = np.full(nodes.T.shape, np.inf), np.full(nodes.T.shape, -np.inf)
     for some in spans(len(cells)):
         low, high = _extent(nodes, cells[some])
         given = slice(*np.searchsorted(cut, [some.start, some.stop]))
         low[cut[given] - some.start], high[cut[given] - some.start] = cut_low[given], cut_high[given]
-        for a in range(4):
-            np.minimum.at(node_low, cells[some, a], low)
-            np.maximum.at(node_high, cells[some, a], high)
-    return node_low, node_high
+        low, high = low.T.copy(), high.T.copy()
+        for corner in cells[some].T.astype(np.intp, order="C"):
+            for k in range(3):  # one by one and contiguous: NumPy is several times as fast then
+                np.minimum.at(node_low[k], corner, low[k])
+                np.maximum.at(node_high[k], corner, high[k])
+    return np.ascontiguousarray(node_low.T), np.ascontiguousarray(node_high.T)

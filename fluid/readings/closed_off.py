@@ -36,9 +36,9 @@ def closed_off(water: Water) -> list[ClosedOff]:
     has_air[part[breathes[t.cells].any(axis=1)]] = True
     volume = np.bincount(part, t.volume, count)
     in_cells = np.bincount(part, t.volume / water.mesh.local_size[t.background] ** 3, count)
-    middle = t.nodes[t.cells].mean(axis=1)
     found = []
     for k in np.flatnonzero(~has_air & (in_cells > LEAST)):
         own = part == k
-        found.append(ClosedOff(float(volume[k]), np.average(middle[own], axis=0, weights=t.volume[own])))
+        middle = t.nodes[t.cells[own]].mean(axis=1)
+        found.append(ClosedOff(float(volume[k]), np.average(middle, axis=0, weights=t.volume[own])))
     return sorted(found, key=lambda one: -one.volume)

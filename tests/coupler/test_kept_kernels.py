@@ -56,3 +56,10 @@ def test_the_code_of_llvm_is_read_only_where_it_is_needed(process):
     """Reading it takes a third of the time that a kernel takes to load."""
     process(CALL.format("double"))
     assert process(SHARED) == ["None"]
+
+
+def test_the_compiler_s_knowledge_is_loaded_only_where_something_is_compiled(process):
+    """It takes longer to load than the kernels of a run."""
+    known = "import sys; print('numba.np.arraymath' in sys.modules)"
+    assert process(f"{CALL.format('double')}; {known}") == ["42.0", "0", "True"]
+    assert process(f"{CALL.format('double')}; {known}") == ["42.0", "1", "False"]
