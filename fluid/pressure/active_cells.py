@@ -14,7 +14,8 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import places_among
-from fluid.domain.moments import wet_fraction
+from fluid.domain.moments import touching_among, wet_fraction
+from fluid.numerics.fields import marks_of
 from fluid.pressure.indefinite_cells import without_indefinite
 from kernels.decorators import kernel, ranged
 from kernels.threads import over
@@ -51,9 +52,9 @@ class WetPart:
         void = cells[dry]
         if len(void) > 0:
             cells = np.delete(cells, dry)
-            reached = np.zeros(len(phi), bool)
-            reached[t.cells[cells]] = True
-            below &= reached
+            left = marks_of(t.cells[void].reshape(-1), len(phi))
+            left[t.cells[touching_among(cells, left, t.cells)]] = False
+            below &= ~left
         return cls(below, cells, wet_fraction(cells, phi, t.parts), void)
 
 

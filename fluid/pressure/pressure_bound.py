@@ -77,7 +77,7 @@ class BoundMet:
             parted_at = problem.of_water(np.where(vented, problem.of_open_air, problem.bound))
             work = -problem.dt * float(np.sum(problem.of_water(rate) * parted_at))
         if met:
-            area = wall_area(water.mesh, water.domain)
+            area = water.wall_area()
             wall = float(area[at_bound].sum()) / max(float(area[problem.dofs].sum()), 1e-300)
         return cls(
             at_bound=at_bound,

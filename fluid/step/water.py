@@ -25,6 +25,7 @@ from fluid.mesh.background import Background
 from fluid.numerics.fields import nothing
 from fluid.numerics.sums import kinetic_energy, total
 from fluid.pressure.displaced import taken_from_nodes
+from fluid.pressure.pressure_bound import wall_area
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
@@ -374,6 +375,7 @@ class Water:
         if self.sides is not None:
             self.sides.place(domain, self.topology.active)
         self._domain_is_new = True
+        self._wall_area: Array | None = None
         self.graph = None
 
     def find_band(self) -> None:
@@ -458,6 +460,12 @@ class Water:
         if any(one is not other for one, other in zip(self._summed[0], of)):
             self._summed = of, total(water) - total(displaced) - in_films
         return self._summed[1]
+
+    def wall_area(self) -> Array:
+        """Area (N,) [m²] of the walls around each node, found once for a domain (`pressure_bound.py`)."""
+        if self._wall_area is None:
+            self._wall_area = wall_area(self.mesh, self.domain)
+        return self._wall_area
 
     def displacement(self, dt: float) -> Array:
         """Volume (N,) [m³] that the bodies have displaced at the nodes since the cells were cut, at the end of a step

@@ -62,3 +62,15 @@ def test_faces_on_the_border_of_whole_cells_wet_no_part():
     holds = _holding(domain, water.topology, water.level_set, -1e-9 * CELL)
     assert len(holds) > 10
     assert not holds.any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_unknowns_are_the_nodes_below_the_surface_that_a_cell_with_water_touches(seed):
+    """A node of void cells alone has no row of its own; with one, the matrix would be singular."""
+    water = boxes_in_water(seed, 0.83, WIDE_OPENINGS)
+    part, t = WetPart.of(water.topology, water.domain, water.level_set, CELL), water.topology
+    touched = np.zeros(len(t.nodes), bool)
+    touched[t.cells[part.cells]] = True
+    below = (water.level_set < 0.0) & t.active
+    np.testing.assert_array_equal(part.nodes, below & touched)
+    assert (below & ~touched).any()
