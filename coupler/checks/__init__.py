@@ -10,6 +10,7 @@ gauges                                       gauges: places, and what they would
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
 arrivals, records                            waves that come after the end of the run; records of inflows
 supports                                     what carries blocks: parts that hang, a ground off the floor of the tank
+fronts                                       fronts on dry beds with friction, over cells that are too high
 gaps, insides                                gaps beside thin walls, narrower than a cell; buildings full of water
 sides                                        loose blocks that rub on the sides of a slice
 tables                                       results that would be written to one place

@@ -9,6 +9,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.materials import material_remarks
 from coupler.checks.arrivals import arrival_remarks
+from coupler.checks.fronts import front_remarks
 from coupler.checks.gaps import gap_remarks
 from coupler.checks.gauges import gauge_remarks
 from coupler.checks.insides import inside_remarks
@@ -37,6 +38,7 @@ def remarks(case: Case) -> list[str]:
         *softness_remarks(case),
         *support_remarks(case),
         *water_remarks(case),
+        *front_remarks(case),
         *arrival_remarks(case),
         *material_remarks(case),
         *_joint_remarks(case),
