@@ -173,11 +173,11 @@ def _mixed(first, last, nodes, volumes, weights, at_surface, on_open_side, carri
 @ranged
 def _shares(first, last, weight, fast, near_solids, on_open_side, jumps, larger):
     """The weight around jumps (N,), zero near solids and on open sides, and the larger of that and the one in fast
-    water (N,), which does not count on open sides."""
+    water (N,), which counts on open sides, too: what the correction brings from there is then handed on."""
     for j in range(first, last):
         i = np.uint64(j)
         out = 0.0 if near_solids[i] or on_open_side[i] else weight[i]
-        jumps[i], larger[i] = out, out if on_open_side[i] else max(out, fast[i])
+        jumps[i], larger[i] = out, max(out, fast[i])
 
 
 @released

@@ -153,6 +153,13 @@ def test_an_inclined_plate_takes_the_part_of_the_momentum_across_it():
     assert force == pytest.approx(np.sin(np.radians(60.0)), rel=0.05)
 
 
+def test_the_momentum_of_what_the_correction_takes_from_a_jet_reaches_an_inclined_plate():
+    """On two cells the correction of the level set takes volume from the jet that the sheets on the plate lack: while
+    its momentum went no farther than five cells, 0.028 of the force were missing on the mean of these places."""
+    force = [jet(12.0, 2, angle=60.0, long=True, aside=aside).force for aside in (0.0, 0.25, 0.5, 0.75)]
+    assert np.mean(force) == pytest.approx(np.sin(np.radians(60.0)), rel=0.015)
+
+
 def test_the_weight_of_the_water_hardly_adds_to_the_force_on_an_inclined_plate():
     """ρ g SLUG D cos a, over ρ U² D sin a: with ten times the gravity it was 1.4 % of the force at 30 degrees, and the
     momentum of the jet, to which the force is compared, does not contain it."""
