@@ -259,7 +259,7 @@ def test_cells_that_do_not_hang_together_are_refused(tmp_path, made, reported):
 @pytest.mark.parametrize(
     ("points", "cells", "reported"),
     [
-        (prism(), {"wedge": [range(6)]}, "1 cells of kind 'wedge'; the water takes linear tetrahedra only: mesh with"),
+        (prism(), {"wedge": [range(6)]}, "1 cell of kind 'wedge'; the water takes linear tetrahedra only: mesh with"),
         (prism(), {"triangle": [range(3)]}, "no tetrahedra among its cells (1 of kind 'triangle'); mesh the volume"),
         (np.random.default_rng(0).random((10, 3)), {"tetra10": [range(10)]}, "'tetra10'; the water takes linear"),
     ],
