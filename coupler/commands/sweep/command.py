@@ -133,10 +133,7 @@ def _make(spec: Spec, request: SweepRequest) -> bool:
     """Make the missing runs; returns whether this was stopped before the end."""
     ids = _to_make(spec, request.any_version)
     rows, runs = counted(len(spec.rows), "row"), counted(len(spec.runs), "run")
-    print(
-        f"{rows}, {runs}, {len(ids)} to make; results in {spec.folder}",
-        flush=True,
-    )
+    print(f"{rows}, {runs}, {len(ids)} to make; results in {spec.folder}", flush=True)
     if not ids:
         return False
     summary = _Progress(spec, len(ids))
