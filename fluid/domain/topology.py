@@ -39,7 +39,7 @@ class Topology:
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
     cut cells · parts: the fluid parts of the cells · obtuse (M,) bool: cells with obtuse dihedral
-    angles, is_obtuse: the mesh has such cells · upright (rows of `gradients`,) bool: `Background.upright` ·
+    angles, is_obtuse: the mesh has such cells · along (rows of `gradients`,) uint8: `Background.along` ·
     node_size (N,) [m]: `Background.node_size`, slanting, sloping_bed (N,) bool: as in `Background` ·
     divided (N,) bool: copies of a node that has several ·
     spacing [m] of the mesh."""
@@ -65,7 +65,7 @@ class Topology:
     parts: FluidParts
     obtuse: Bools
     is_obtuse: bool
-    upright: Bools
+    along: Integers
     node_size: Floats
     slanting: Bools
     sloping_bed: Bools
@@ -114,7 +114,7 @@ class Topology:
             ),
             obtuse=mesh.obtuse[background],
             is_obtuse=mesh.is_obtuse,
-            upright=shapes.upright,
+            along=shapes.along,
             node_size=mesh.node_size[domain.parent_node],
             slanting=mesh.slanting[domain.parent_node],
             sloping_bed=mesh.sloping_bed[domain.parent_node],
@@ -133,7 +133,7 @@ class Topology:
             self.share,
             self.share_row,
             self.size,
-            self.upright,
+            self.along,
         )
 
     @cached_property

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from array_types import Bools, Floats, Integers, Ints
+from array_types import Floats, Integers, Ints
 
 
 class Planes(NamedTuple):
@@ -53,8 +53,8 @@ class Hats(NamedTuple):
 
 class FluidCells(NamedTuple):
     """`Hats` of a domain with the fluid part of its cells: volume (M,) [m³] · share (K + 1, 4) mean of each function
-    over it, 1/4 in the first row, that of all whole cells · share_row (M,) row of each cell · size (M,) [m] · upright
-    (rows of the gradients,) bool: see `Background.upright`."""
+    over it, 1/4 in the first row, that of all whole cells · share_row (M,) row of each cell · size (M,) [m] · along
+    (rows of the gradients,) uint8: see `Background.along`."""
 
     cells: Integers
     parent: Integers
@@ -63,7 +63,7 @@ class FluidCells(NamedTuple):
     share: Floats
     share_row: Integers
     size: Floats
-    upright: Bools
+    along: Integers
 
 
 class Paths(NamedTuple):

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 from skfem import MeshTet
 
 from array_types import Array, Floats, Integers, Ints
+from fluid.mesh.brick_sides import ALL, NONE, sides_of
 from fluid.mesh.bricks import SPLITS, split_bricks
 from fluid.mesh.gradients import gradient_rows, gradients, products_of
 from fluid.mesh.neighbours import cell_neighbours
@@ -31,9 +32,6 @@ from fluid.numerics.spans import spans
 from kernels.decorators import inner, kernel
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
-MOST_SLENDER = 2.5
-"""Longest over shortest edge of a cell, 1.73 in a split cube, up to which volume passes through borders upright on its
-edges on meshes with obtuse cells."""
 SAME_SIZE = 1e-9
 """Difference of sizes over the spacing that counts as round-off."""
 IN_PLANE, ROUND_OFF = 1e-10, 16.0 * float(np.finfo(float).eps)
@@ -57,7 +55,8 @@ class Background:
     nodes (N, 3) [m] · cells (M, 4) uint32 · spacing [m], mean edge of the equivalent brick (6 |e|)^(1/3) ·
     cell_volume (M,) [m³] · neighbours (M, 4) int32 ·
     boundary_faces (B, 3) · boundary_cell (B,) · boundary_normal (B, 3), outward, unit ·
-    axes: three increasing arrays [m], the walls of the bins · bin_start, bin_cells: cells of each bin (CSR).
+    axes: three increasing arrays [m], the walls of the bins · bin_start, bin_cells: cells of each bin (CSR) ·
+    sides (M,) uint8: which edges of a cell are sides of a brick (`brick_sides.py`).
     """
 
     nodes: Floats
@@ -71,22 +70,23 @@ class Background:
     axes: tuple[Array, Array, Array]
     bin_start: Ints
     bin_cells: Integers
+    sides: Integers
 
     @classmethod
-    def from_arrays(cls, nodes, cells, axes=None, straddling: bool = False) -> Background:
+    def from_arrays(cls, nodes, cells, axes=None, straddling: bool = False, lattice=None) -> Background:
         """A mesh of any tetrahedra: nodes (N, 3) [m], cells (M, 4).  Cells may have either orientation.
 
         axes: walls of bins such that no cell straddles two of them (a split brick lattice), or None · straddling: cells
-        may straddle the bins of `axes`.
+        may straddle the bins of `axes` · lattice (N, 3): places of the nodes in bricks of edge 1, None: of no bricks.
         Raises MeshError for cells without volume or indices out of range."""
         nodes = np.ascontiguousarray(nodes, float)
         cells, volume = _oriented(nodes, _checked_cells(nodes, cells))
         neighbours = cell_neighbours(cells, len(nodes))
         faces, owner = _boundary(cells, neighbours)
         spacing = float(cube_root(6.0 * volume.mean()))
-        lattice = axes is not None and not straddling
+        in_bins = axes is not None and not straddling
         axes = _uniform_axes(nodes, spacing) if axes is None else tuple(np.asarray(a, float) for a in axes)
-        start, members = _bins(nodes, cells, axes, lattice)
+        start, members = _bins(nodes, cells, axes, in_bins)
         normal = _face_normals(nodes, faces)
         return cls(
             nodes=nodes,
@@ -100,6 +100,7 @@ class Background:
             axes=axes,
             bin_start=start,
             bin_cells=members,
+            sides=np.zeros(len(cells), np.uint8) if lattice is None else sides_of(lattice, cells),
         )
 
     def locate(self, points) -> Array:
@@ -215,12 +216,13 @@ class Background:
         return bool(self.obtuse.any())
 
     @cached_property
-    def upright(self) -> Array:
-        """(M,) bool: cells in which volume passes through borders upright on the edges (`volume.py`): on meshes
-        without obtuse cells all, on others those that are neither obtuse nor slender."""
+    def along(self) -> Array:
+        """(M,) uint8: along which edges of a cell volume passes, see `brick_sides.py`. On meshes without obtuse cells
+        along ALL; on others along the sides of the bricks that cells are parts of, where they are known, and in other
+        obtuse cells along NONE in particular, through the planes of their medians."""
         if not self.is_obtuse:
-            return np.ones(len(self.cells), bool)
-        return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
+            return np.full(len(self.cells), ALL, np.uint8)
+        return np.where(self.sides == NONE, np.where(self.obtuse, NONE, ALL), self.sides).astype(np.uint8)
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -385,22 +387,6 @@ def _fill_bins(low, high, nx, ny, nz):
     order = np.argsort(bin_of_entry, kind="stable")
     start = np.concatenate([[0], np.cumsum(np.bincount(bin_of_entry, minlength=nx * ny * nz))])
     return start, cell[order].astype(np.uint32)
-
-
-@kernel
-def _slenderness(x, cells):
-    """Longest over shortest edge (M,) of the cells."""
-    out = np.empty(cells.shape[0])
-    for e in range(cells.shape[0]):
-        shortest, longest = np.inf, 0.0
-        for a in range(4):
-            for b in range(a + 1, 4):
-                length = 0.0
-                for k in range(3):
-                    length += (x[cells[e, b], k] - x[cells[e, a], k]) ** 2
-                shortest, longest = min(shortest, length), max(longest, length)
-        out[e] = np.sqrt(longest / shortest)
-    return out
 
 
 @inner

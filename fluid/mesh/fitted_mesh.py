@@ -103,7 +103,7 @@ def fitted_mesh(
     columns = _Columns.of(kept, base, lid, layers, used, x, y)
     cells = _cells(*columns.of_cells(), ~above, split == "mirrored")
     z = np.linspace(kept[used].min(), lid, round((lid - kept[used].min()) / layer) + 1)
-    mesh = Background.from_arrays(columns.nodes, cells, (x, y, z), straddling=True)
+    mesh = Background.from_arrays(columns.nodes, cells, (x, y, z), straddling=True, lattice=columns.lattice())
     on_bed = np.zeros(len(columns.nodes), bool)
     on_bed[columns.start[:-1][used.ravel()]] = True
     bed_face = on_bed[mesh.boundary_faces].all(axis=1)

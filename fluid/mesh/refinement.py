@@ -142,7 +142,8 @@ def refined_mesh(mesh: Background, regions, lattice=None) -> Background:
     cells = refined(start, chosen, levels)
     if len(cells.cells) == len(mesh.cells):
         return mesh
-    return Background.from_arrays(cells.nodes, cells.cells, _bin_walls(mesh.axes, cells), straddling=True)
+    walls = _bin_walls(mesh.axes, cells)
+    return Background.from_arrays(cells.nodes, cells.cells, walls, straddling=True, lattice=cells.lattice)
 
 
 def _common(low, high, lower, upper) -> float:

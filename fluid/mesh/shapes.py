@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from array_types import Bools, Floats, Integers
+from array_types import Floats, Integers
 from fluid.mesh.gradients import gradients, products_of
 from fluid.numerics.spans import spans
 from kernels.decorators import inner, kernel, plain
@@ -27,13 +27,13 @@ SAME = 1e-12
 
 @dataclass(frozen=True)
 class Shapes:
-    """row (M,): shape of each cell of a mesh · gradients (S, 4, 3) [1/m], products (S, 6) [1/m²] and upright (S,) bool
+    """row (M,): shape of each cell of a mesh · gradients (S, 4, 3) [1/m], products (S, 6) [1/m²] and along (S,) uint8
     of the shapes, those of their first cells; names as in `mesh.Background`."""
 
     row: Integers
     gradients: Floats
     products: Floats
-    upright: Bools
+    along: Integers
 
     @property
     def is_of_each_cell(self) -> bool:
@@ -46,13 +46,13 @@ class Shapes:
         row, first = _few(mesh)
         if len(first):
             g = mesh.gradients_of(first)
-            return cls(row, g, products_of(g), mesh.upright[first])
+            return cls(row, g, products_of(g), mesh.along[first])
         g = gradients(mesh.nodes, mesh.cells)[0]
         row, first = _kinds(g)
         if len(first):
             g = g[first]
-            return cls(row, g, products_of(g), mesh.upright[first])
-        return cls(np.arange(len(g), dtype=np.uint32), g, products_of(g), mesh.upright)
+            return cls(row, g, products_of(g), mesh.along[first])
+        return cls(np.arange(len(g), dtype=np.uint32), g, products_of(g), mesh.along)
 
 
 def _few(mesh):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from fluid.numerics.fields import is_nothing, nothing
+from fluid.numerics.fields import is_nothing
 from fluid.step.kick import kicked
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
@@ -36,6 +36,4 @@ def _by_fluxes(water: Water, dt: float, theta: float, kick) -> Carried:
     found, moved = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size)
     if p.advection == "supg":
         found = found.near_the_surface()
-    if t.is_obtuse:
-        return replace(found, swept=nothing(len(phi)))
     return replace(found, swept=swept(t, flux, phi, u_m, moved, dt))

@@ -14,10 +14,10 @@ height.
 
 Mean over the step by Simpson's rule, with φ carried on by its mean slope at the nodes, which is good for a part of a
 cell: in water that crosses half of one in a step the shares count alone (fronts of dam breaks came 0.2 % later and the
-wave that comes back in P39 8 ms).  The fluxes stay what they are on meshes with obtuse cells, and deeper than the
-surface gets.  In cells that solids cut, w_e is the share of their fluid part, to round-off (`fans.py`): there the
-shares of nodes miss most, as hats that begin inside a solid have the least of their profile where the water is.  Over
-a bed of 1:20 through the cells they moved water a seventh faster than its velocity.
+wave that comes back in P39 8 ms).  The fluxes stay what they are deeper than the surface gets.  In cells that solids
+cut, w_e is the share of their fluid part, to round-off (`fans.py`): there the shares of nodes miss most, as hats that
+begin inside a solid have the least of their profile where the water is.  Over a bed of 1:20 through the cells they
+moved water a seventh faster than its velocity.
 """
 
 from __future__ import annotations

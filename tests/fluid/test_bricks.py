@@ -6,6 +6,7 @@ import pytest
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import MeshError, box_mesh
+from fluid.mesh.brick_sides import ALL
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from tests.fluid.scenes import advance, column
@@ -24,7 +25,7 @@ def test_mirrored_bricks_fill_the_box_without_gaps():
     assert mesh.cell_volume == pytest.approx(CELL**3 / 6)
     assert len(mesh.boundary_faces) == 4 * (5 * 4 + 5 * 3 + 4 * 3)
     assert not mesh.is_obtuse
-    assert mesh.upright.all()
+    assert (mesh.along == ALL).all()
     assert np.all(np.diff(mesh.bin_start) == 6)
 
 

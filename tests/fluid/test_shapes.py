@@ -13,7 +13,7 @@ def test_a_box_has_six_shapes_with_the_gradients_of_its_cells():
     assert len(shapes.gradients) == 6
     np.testing.assert_allclose(shapes.gradients[shapes.row], mesh.gradients, atol=SAME * 20.0)
     np.testing.assert_allclose(shapes.products[shapes.row], mesh.products, atol=SAME * 400.0)
-    np.testing.assert_array_equal(shapes.upright[shapes.row], mesh.upright)
+    np.testing.assert_array_equal(shapes.along[shapes.row], mesh.along)
 
 
 def test_bricks_of_two_sizes_are_distinguished():
