@@ -19,8 +19,9 @@ from fluid.domain.point_location import Places
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.mesh.refinement import OnBed, refined_mesh
 from fluid.readings.gauges import levels
+from fluid.sides.absorbing import Absorber
 from fluid.sides.inflow import Flow, Side, Sides
-from fluid.sides.waves import SolitaryWave
+from fluid.sides.waves import SolitaryWave, tide
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 
@@ -124,8 +125,9 @@ def _monai(cell, share: float = 1.0) -> tuple[Coast, np.ndarray]:
 
 
 ISLAND = {"lower": (7.04, 13.8, -0.32), "upper": (18.56, 19.24, 0.296), "cell": (0.32, 0.32, 0.088)}
-"""Half of a part of the basin: its wall y- is the plane of symmetry, through the middle of the island. The lid lies so
-high that no column within reach of the water ends below it: their beds would be lowered, a moat at 6 cm."""
+"""Half of a part of the basin: its wall y- is the plane of symmetry, through the middle of the island, and x+, which is
+6 m before the end of the basin, lets waves out. The lid lies so high that no column within reach of the water ends
+below it: their beds would be lowered, a moat at 6 cm."""
 MIDDLE, TOE, SLOPE, HEIGHT = (12.96, 13.80), 3.6, 0.25, 0.625
 """[m] Middle of the island, radius of its toe, its slope and height."""
 STILL_DEPTH, WAVE = 0.32, 0.096 * 0.32
@@ -182,13 +184,14 @@ def _island(cell) -> tuple[Coast, np.ndarray, np.ndarray]:
     wave = SolitaryWave(STILL_DEPTH, WAVE, G, 0.0)
     crest = np.arccosh(np.sqrt(20.0)) / (wave.rate * wave.speed)
     flow = SolitaryWave(STILL_DEPTH, WAVE, G, crest).flow((1.0, 0.0, 0.0), -STILL_DEPTH)
+    end = _absorbing_end(mesh, -STILL_DEPTH, fitted.column_y[1:-1], ISLAND["cell"][0])
     angle, radius = (
         a.ravel() for a in np.meshgrid(np.arange(90.0, 271.0, 2.5), np.arange(1.5, 2.6, 0.005), indexing="ij")
     )
     x = MIDDLE[0] + radius * np.sin(np.radians(angle))
     y = np.maximum(MIDDLE[1] - radius * np.cos(np.radians(angle)), MIDDLE[1] + 1e-6)
     places = np.column_stack([x, y])
-    run = _run(fitted, (tuple(ISLAND_GAUGES.values()), 0.0), flow, ISLAND_END, places, mesh=mesh)
+    run = _run(fitted, (tuple(ISLAND_GAUGES.values()), 0.0), flow, ISLAND_END, places, mesh=mesh, end=end)
     return run, _bed_at(fitted, places), angle
 
 
@@ -209,18 +212,31 @@ def _long_wave(level, depth: float) -> Flow:
     return Flow(level, velocity)
 
 
-def _run(fitted, gauges, flow: Flow, until: float, looked_at, still: float = 0.0, mesh=None) -> Coast:
+def _absorbing_end(mesh, bed: float, along, cell: float) -> Side:
+    """The side x+ of a mesh with a level bed at a height [m] there and still water at z = 0 outside, which lets waves
+    out; the water is read at y of `along` (k,) [m], a cell [m] inside."""
+    inward, right = np.array([-1.0, 0.0, 0.0]), mesh.bounds[1, 0]
+    places = np.column_stack([np.full(len(along), right - cell), along])
+    still = tide(inward, lambda time: 0.0)
+    flow = Absorber(still, inward, places, np.full(len(along), bed), G).as_flow()
+    return Side.of(mesh, lambda n, c: (n[:, 0] > 0.5) & (c[:, 0] > right - 1e-6), flow)
+
+
+def _run(
+    fitted, gauges, flow: Flow, until: float, looked_at, still: float = 0.0, mesh=None, end=None
+) -> Coast:
     """A run over a bed with the flow through x-; the level of still water [m]; gauges: (places, shift of time [s]) ·
     looked_at (p, 2) [m]: places at which it is noted whether the bed gets wet · mesh: with finer parts, None: the
-    fitted one."""
+    fitted one · end: another `Side`, None: all others are walls."""
     (places, shift), mesh = gauges, fitted.mesh if mesh is None else mesh
     layer = fitted.layer * mesh.finest / fitted.mesh.finest
     places = np.array(places)
     immersion = Immersion(mesh, None, [], "single")
     left = mesh.bounds[0, 0]
     side = Side.of(mesh, lambda n, c: (n[:, 0] < -0.5) & (c[:, 0] < left + 1e-6), flow)
+    sides = [side] if end is None else [side, end]
     settings = WaterParameters(density=DENSITY, gravity=G)
-    water = Water(mesh, immersion.domain, lambda x: x[:, 2] - still, settings, None, None, Sides([side]))
+    water = Water(mesh, immersion.domain, lambda x: x[:, 2] - still, settings, None, None, Sides(sides))
     coupling = CoupledStepper(water, None, immersion, rtol=1e-7, step_max=1.0, clock=Clock())
     bed_there = _bed_at(fitted, looked_at) + FILM * layer
     there = np.isfinite(bed_there)
