@@ -111,6 +111,9 @@ class Joints:
         self._keeps_out = np.array([law.uplift == "none" for law in laws], bool)
         self._by_damage = np.array([law.uplift == "damage" for law in laws], bool)
         self._peak = np.array([law.peak_share for law in laws])
+        self._kinked = np.array(
+            [law.closing_ratio != 1.0 or law.mixed_mode != "effective" for law in laws], bool
+        )
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
         self.stiffness_on: tuple[Array, Array] | None = None
@@ -210,6 +213,10 @@ class Joints:
 
     def _list_visited(self) -> None:
         self.visited = self.live[~self.resting[self.live]] if self.resting.any() else self.live
+
+    def closes_as_it_opens(self) -> bool:
+        """Whether opening and closing act on each other in no joint, and both begin with the same stiffness."""
+        return not self._kinked[self.visited].any()
 
     def visited_points(self) -> Array:
         """Points of the joints that are alive and do not rest."""
