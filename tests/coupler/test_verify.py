@@ -3,12 +3,14 @@
 import json
 import math
 
+import numpy as np
 import pytest
 
 from coupler.case.records import SHIPPED
-from coupler.commands.verify import dam_breaks, page, registry, report, runner
+from coupler.commands.verify import collapse, dam_breaks, page, registry, report, runner
 from coupler.commands.verify.figures import columns, named_values
 from coupler.commands.verify.registry import Check, Finding, Result
+from coupler.commands.verify.scenes import tank
 from coupler.program.errors import BadCase, ExitCode
 
 
@@ -110,3 +112,19 @@ def test_a_failure_is_counted_and_named():
     reported = report.totals([good, bad])
     assert "1 of 2 cases pass" in reported
     assert "not: P02" in reported
+
+
+@pytest.mark.parametrize("cells", [8, 12])
+@pytest.mark.parametrize("at", [0.513, 0.54])
+def test_the_front_of_a_wedge_is_read_where_it_is(cells, at):
+    """A plane surface that meets a line above the bed at x = `at`, between the points of the line: the cells represent
+    it exactly. Read at the last wet point, the front lagged by up to their distance, more on coarser cells."""
+    height = 0.03
+
+    def wedge(x):
+        return 0.8 * (x[:, 0] - at) + 0.6 * (x[:, 2] - height)
+
+    water = tank((1.0, 1.0 / cells, 1.0), (cells, 1, cells), wedge).water
+    x = np.linspace(0.0, 1.0, 4 * cells + 1)
+    bed = np.column_stack([x, np.full_like(x, 0.5 / cells), np.full_like(x, height)])
+    assert collapse._front(water, bed) == pytest.approx(at, abs=1e-9)

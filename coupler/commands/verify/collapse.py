@@ -17,15 +17,18 @@ A = 0.05715
 """Width of Martin and Moyce's column [m]; its height is 2 a."""
 SMOOTH = 4e-5
 """k_s [m] of a hydraulically smooth wall, 3.3 ν/u*, at the friction velocity u* = 0.08 m/s of this front."""
-SLIPPING = 2.248
-"""T at Z = 3 of the front without friction, released at once: cells of a/64 and CFL 1 (a/16 with CFL 1/4: 2.291;
-2.243 and 2.289 while the surface moved half of the last step ahead, which in steps that get shorter is too far)."""
+FRONT_AT = A / 64
+"""Height above the bed [m] at which the front is read, on all cells: a quarter of a cell of a/16. At a quarter of each
+cell the front of a/64 is farther down its wedge, where it is 0.6 % earlier."""
+SLIPPING = 2.263
+"""T at Z = 3 of the front without friction, released at once: cells of a/64 and CFL 1."""
 TABLE = "Martin and Moyce 1952"
 
 
 @dataclass(frozen=True)
 class Collapse:
-    """T = t sqrt(2 g/a), front Z = x/a at the bed, height H = h/(2 a) at the wall, all (n,); losses of the run."""
+    """T = t sqrt(2 g/a), front Z = x/a at FRONT_AT above the bed, height H = h/(2 a) at the wall, all (n,); losses of
+    the run."""
 
     T: np.ndarray
     Z: np.ndarray
@@ -94,7 +97,7 @@ def collapse(until: float, n: int = 16, **settings) -> Collapse:
     c = tank((7 * A, 2 * A / n, 2.5 * A), (7 * n, 2, round(2.5 * n)), column(A, 2 * A), rtol=1e-7, **settings)
     scale, losses = np.sqrt(2 * G / A), Losses(c.water)
     x = np.linspace(0, 7 * A, 7 * n * 4 + 1)
-    bed = np.column_stack([x, np.full_like(x, A / n), np.full_like(x, 0.25 * A / n)])
+    bed = np.column_stack([x, np.full_like(x, A / n), np.full_like(x, FRONT_AT)])
     rows = [(0.0, 1.0, 1.0)]
     while rows[-1][0] < until:
         c.step(c.water.stable_step())
@@ -105,7 +108,9 @@ def collapse(until: float, n: int = 16, **settings) -> Collapse:
 
 
 def _front(water, bed) -> float:
-    """x [m] of the last wet point of the line `bed` (m, 3) before the first dry one."""
-    wet = gauges.level_set_at(water, bed) < 0.0
-    first_dry = len(bed) - 1 if wet.all() else int(np.argmin(wet))
-    return bed[max(first_dry - 1, 0), 0]
+    """x [m] of the surface along the line `bed` (m, 3) between the last wet point before the first dry one and this."""
+    level = gauges.level_set_at(water, bed)
+    dry = int(np.argmax(level >= 0.0)) if (level >= 0.0).any() else len(bed)
+    if dry in (0, len(bed)):
+        return bed[max(dry - 1, 0), 0]
+    return float(np.interp(0.0, level[dry - 1 : dry + 1], bed[dry - 1 : dry + 1, 0]))
