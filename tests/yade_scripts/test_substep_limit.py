@@ -14,8 +14,9 @@ from yade_scripts.dynamics.structure import Structure
 from yade_scripts.dynamics.timestep import (
     CONTACT_SHARE,
     DRIVEN_SHARE,
-    JOINT_SHARE,
-    KINK_SHARE,
+    HOLDING_SHARE,
+    QUIET,
+    SOFTENING_SHARE,
     STABLE_SHARE,
     SubstepTooLong,
     contact_limits,
@@ -39,7 +40,7 @@ def test_a_substep_beyond_the_explicit_limit_is_refused_with_the_pair():
     """In a single step and for the whole structure; nothing has moved then."""
     with Structure(two_cubes(), None, JOINT, gravity=STILL) as s:
         limit = s.substep_limit()
-        assert limit.stable == pytest.approx(limit.dt / JOINT_SHARE)
+        assert limit.stable == pytest.approx(limit.dt / HOLDING_SHARE)
         with pytest.raises(SubstepTooLong, match="joint low - high"):
             s.advance(1.0, substep=1.01 * limit.stable)
         assert s.time == 0.0
@@ -62,14 +63,14 @@ def test_the_substep_of_the_structure_is_taken():
 @pytest.mark.parametrize(
     ("change", "share"),
     [
-        ({}, JOINT_SHARE),
-        ({"law": "bilinear"}, JOINT_SHARE),
-        ({"closing_ratio": 4.0}, KINK_SHARE),
-        ({"closing_ratio": 0.5}, KINK_SHARE),
-        ({"mixed_mode": "needleman"}, KINK_SHARE),
+        ({}, HOLDING_SHARE),
+        ({"law": "bilinear"}, HOLDING_SHARE),
+        ({"closing_ratio": 4.0}, SOFTENING_SHARE),
+        ({"closing_ratio": 0.5}, SOFTENING_SHARE),
+        ({"mixed_mode": "needleman"}, SOFTENING_SHARE),
     ],
 )
-def test_joints_that_close_as_they_open_take_longer_substeps(change, share):
+def test_joints_that_close_as_they_open_take_longer_substeps_while_they_hold(change, share):
     with Structure(two_cubes(), None, replace(JOINT, **change), gravity=STILL) as s:
         limit = s.substep_limit()
         assert limit.dt == pytest.approx(share * limit.stable)
@@ -81,11 +82,37 @@ def test_one_joint_with_a_kink_shortens_the_substep_until_it_has_failed():
     rules = JointRules(JOINT, (PairJoints("low", "high", kinked),))
     with Structure(two_cubes(velocity=(0, 0, 5.0)), None, rules, ground=0.0, gravity=STILL) as s:
         before = s.substep_limit()
-        assert before.dt == pytest.approx(KINK_SHARE * before.stable)
+        assert before.dt == pytest.approx(SOFTENING_SHARE * before.stable)
         s.advance(1e-3)
         assert s.joint_table().alive.sum() == 1
         after = s.substep_limit()
-        assert after.dt == pytest.approx(JOINT_SHARE * after.stable)
+        assert after.dt == pytest.approx(HOLDING_SHARE * after.stable)
+
+
+def test_substeps_are_shorter_from_where_a_joint_is_pulled_fast():
+    """Less than half of the strength, applied at once, on a cube at rest: it begins with long substeps and goes on with
+    short ones in the same step. Going back to before it gives the same again."""
+    with Structure(two_cubes(), None, JOINT, gravity=STILL) as s:
+        step, stable = 0.002, s.substep_limit().stable
+        s.set_load(np.array([[0.0] * 6, [0.0, 0.0, 0.4e6, 0.0, 0.0, 0.0]]))
+        before = s.save()
+        assert s.substep_limit().dt == pytest.approx(HOLDING_SHARE * stable)
+        first = s.advance(step)
+        assert first.opening_rate > QUIET / 10
+        assert step / (HOLDING_SHARE * stable) + 5 < first.substeps < step / (SOFTENING_SHARE * stable)
+        after = s.save().motion
+        s.restore(before)
+        assert s.substep_limit().dt == pytest.approx(HOLDING_SHARE * stable)
+        assert s.advance(step).substeps == first.substeps
+        np.testing.assert_array_equal(s.save().motion, after)
+
+
+def test_blocks_that_fly_apart_begin_with_short_substeps():
+    """Although no joint has opened yet; from compression, too."""
+    for speed in (0.9, -0.9):
+        with Structure(two_cubes(velocity=(0, 0, speed)), None, JOINT, gravity=STILL) as s:
+            limit = s.substep_limit()
+            assert limit.dt == pytest.approx(SOFTENING_SHARE * limit.stable)
 
 
 @pytest.mark.parametrize("law", ["polynomial", "exponential", "bilinear"])
@@ -115,7 +142,7 @@ def test_the_explicit_limit_is_where_energy_starts_to_grow(share):
     damages the joint."""
     with Structure(two_cubes(velocity=(1e-7, 0.0, 0.0)), None, JOINT, gravity=STILL) as s:
         dt = share * 2.0 / exact_joint_frequency(s.blocks, s.joints)
-        s._limit = replace(s.substep_limit(), stable=2.0 * dt)
+        s._limits = dict.fromkeys((False, True), replace(s.substep_limit(), stable=2.0 * dt))
         s.advance(200 * dt, substep=dt)
         grown = s.joint_table().damage.max()
         if share < 1.0:
@@ -164,7 +191,7 @@ def test_the_limit_with_dashpots_is_where_energy_starts_to_grow(share):
     with Structure(two_cubes(velocity=(1e-7, 0.0, 0.0)), None, damped, gravity=STILL) as s:
         dt = share * s.substep_limit().stable * s.substep_limit().omega
         dt /= exact_joint_frequency(s.blocks, s.joints)
-        s._limit = replace(s.substep_limit(), stable=2.0 * dt)
+        s._limits = dict.fromkeys((False, True), replace(s.substep_limit(), stable=2.0 * dt))
         s.advance(200 * dt, substep=dt)
         grown = s.joint_table().damage.max()
         if share < 1.0:
@@ -271,7 +298,7 @@ def test_the_limit_of_contacts_is_at_least_a_third_of_where_energy_starts_to_gro
         stable = s.substep_limit().stable
         s.advance(1.0)
         s.set_load(np.array([[10.0, 5.0, 0.0, 1.0, 2.0, 1.0]]))
-        s._limit = replace(s.substep_limit(), stable=np.inf)
+        s._limits = dict.fromkeys((False, True), replace(s.substep_limit(), stable=np.inf))
         _motion(s, 2000, 0.95 * stable)
         assert s.energies()["kinetic"] < 1e-9
         s.set_load(np.zeros((1, 6)))

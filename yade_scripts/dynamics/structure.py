@@ -25,7 +25,7 @@ from yade_scripts.dynamics.readings import StructureReadings
 from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.dynamics.state import StructureState, check_belongs
 from yade_scripts.dynamics.substep import Substepper
-from yade_scripts.dynamics.timestep import SubstepLimit, contact_limits, substep_limit
+from yade_scripts.dynamics.timestep import QUIET, SubstepLimit, contact_limits, substep_limit
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.joints import Joints
 from yade_scripts.joints.rules import JointRules
@@ -112,7 +112,7 @@ class Structure(StructureReadings):
         self._set_damping()
         self._substep = substep
         if substep is not None:
-            self.substep_limit().check(substep)
+            self._limit_of(holding=False).check(substep)
         self._scene = Scene(load_yade(threads), local, contact is not None, self.gravity)
         self._motion = Motion(self._scene, local_planes)
         self._motion.read()
@@ -189,9 +189,9 @@ class Structure(StructureReadings):
 
     def _set_damping(self) -> None:
         """Dashpot time η = 2 z/ω of the stiffest joint mode; none where all joined blocks are held."""
-        self._limit: SubstepLimit | None = None
+        self._limits: dict[bool, SubstepLimit] = {}
         if self.joints is not None and self.joints.parameters.damping > 0.0:
-            omega = self.substep_limit().omega
+            omega = self._limit_of(holding=False).omega
             self.joints.eta = 2.0 * self.joints.parameters.damping / omega if omega > 0.0 else 0.0
 
     def _start_energy_sums(self, ramp: float) -> None:
@@ -237,7 +237,7 @@ class Structure(StructureReadings):
                 loop.share = share
 
     def _sleepers_changed(self) -> None:
-        self._limit = None
+        self._limits.clear()
         self._list_bodies()
 
     def _list_bodies(self) -> None:
@@ -262,15 +262,19 @@ class Structure(StructureReadings):
             )
         self.blocks[row] = self.blocks[row].changed(velocity=velocity, spin=spin)
         self._scene.set_motion(row, np.concatenate([np.asarray(velocity, float), np.asarray(spin, float)]))
-        self._limit = None
+        self._limits.clear()
         self._motion.read()
 
     def substep_limit(self) -> SubstepLimit:
-        """Largest substep and what limits it; found anew when joints have failed."""
-        if self._limit is None:
+        """Largest substep of the present state and what limits it."""
+        return self._limit_of(self._joints_hold())
+
+    def _limit_of(self, holding: bool) -> SubstepLimit:
+        """The limit while joints hold, or when they no longer do; found anew when joints have failed."""
+        if holding not in self._limits:
             damping = 0.0 if self.joints is None else self.joints.parameters.damping
             asleep = None if self._sleep is None else self._sleep.asleep
-            self._limit = substep_limit(
+            self._limits[holding] = substep_limit(
                 self.blocks,
                 self.joints,
                 self.face_stiffness,
@@ -278,8 +282,16 @@ class Structure(StructureReadings):
                 self.contact,
                 self._contact_stable,
                 asleep,
+                holding,
             )
-        return self._limit
+        return self._limits[holding]
+
+    def _joints_hold(self) -> bool:
+        """Whether all joints hold, and go on to in a substep that is as long as this allows."""
+        m = self._motion
+        if self.joints is None or not self.joints.holding():
+            return False
+        return self.joints.pace(m.x, m.v, m.R) * self._limit_of(holding=True).dt <= QUIET
 
     def stable_substep(self) -> tuple[float, str]:
         """The largest stable substep [s], and the joint or contact that limits it."""
@@ -321,26 +333,36 @@ class Structure(StructureReadings):
         )
 
     def count_substeps(self, dt: float, substep: float | None = None) -> int:
-        """Number of equal substeps in which `advance` takes a time dt [s]. Raises SubstepTooLong as it does."""
-        limit = self.substep() if substep is None else substep
-        self.substep_limit().check(min(limit, dt))
+        """Number of equal substeps in which `advance` begins a time dt [s]. Raises SubstepTooLong as it does."""
+        return self._count(dt, substep, self.substep_limit())
+
+    def _count(self, dt: float, substep: float | None, most: SubstepLimit) -> int:
+        asked = self._substep if substep is None else substep
+        limit = most.dt if asked is None else asked
+        most.check(min(limit, dt))
         if self._sleep is not None and self.still.all() and not self._motion.v.any():
             return 1
         return max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
 
     def _substeps(self, dt: float, count: int, substep: float | None) -> tuple[list[Array], int]:
-        """Take dt [s] in `count` substeps, or in others from where a block woke: joints that failed in each, and how
-        many there were."""
+        """Take dt [s] in `count` substeps, or in others from where a block woke or a joint began to soften: joints that
+        failed in each, and how many there were."""
         broken: list[Array] = []
-        left, length = count, dt / count
+        left, length, holding = count, dt / count, self._joints_hold()
         while left:
             broken.append(self._one_substep(length))
             left -= 1
-            if self._sleep is not None and self._sleep.reached(self.time) and left:
+            woke = self._sleep is not None and self._sleep.reached(self.time)
+            held, holding = holding, holding and self._still_hold()
+            if (woke or held != holding) and left:
                 rest = left * length
-                left = self.count_substeps(rest, substep)
+                left = self._count(rest, substep, self._limit_of(holding))
                 length = rest / left
         return broken, len(broken)
+
+    def _still_hold(self) -> bool:
+        """Whether joints that held before a substep still do."""
+        return self._substepper.fastest <= QUIET and self.joints.holding()
 
     def _turn_on_contacts(self) -> None:
         """Before a step, switch contacts on for pieces that have left their position."""
@@ -371,7 +393,7 @@ class Structure(StructureReadings):
         energy -= j.release(broken, m.x, m.R)
         failed = Parted(j.pairs(broken, self.n), j.pressing(broken, m.x, m.R), energy)
         j.retire(broken, m.x, m.R, self.time)
-        self._limit = None
+        self._limits.clear()
         self._onset.loosen(self._onset.of_failed(broken))
         self._onset.leave_out_joined(failed)
         self._energy_sums.handed_over += float(energy.sum())
@@ -399,6 +421,7 @@ class Structure(StructureReadings):
         self._onset.rest_here()
         if self._contacts is not None:
             self._contacts.moved()
+        self._limits.clear()
         self._energy_sums.start_here()
 
     # ---- saving and going back ------------------------------------------------------------------------------
@@ -424,7 +447,8 @@ class Structure(StructureReadings):
         Raises OtherStructure if the state has other blocks or joints."""
         points = None if self.joints is None else len(self.joints.largest)
         check_belongs(saved, self.n, points, self._contacts is not None, self._sleep is not None)
-        self.time, self._motion.dt, self._limit = saved.time, saved.dt, None
+        self.time, self._motion.dt = saved.time, saved.dt
+        self._limits.clear()
         if self._sleep is not None and saved.sleep is not None:
             asleep = saved.sleep["asleep"].astype(bool)
             self._scene.set_held(asleep)

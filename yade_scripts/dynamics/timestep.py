@@ -5,11 +5,12 @@
 
 K_ii: what a joint holds block i with; c = 2, since |d_a - d_b|² ≤ 2 |d_a|² + 2 |d_b|², or 1 where d_b = 0 is fixed.
 As M_i⁻¹ Σ K_ii is part of the whole, the bound is at most √2 of the exact ω_max. The explicit limit is 2/ω_max. Of it
-0.4 is taken where joints close with the stiffness k_0 with which they open: joints and contacts of one block, which are
-springs beside one another, then stay stable together, 0.4² + 0.9² < 1. It is a tenth where k_c differs from k_0, since
-the leapfrog gains energy at the kink (bilinear law, k_c = 4 k_0: 0.02 % of it at a tenth, 0.6 % at 0.4), and with the
-potential of Needleman, whose work of separation is right only where an opening takes several substeps. A dashpot of
-ratio z shortens the limit by sqrt(1+z²) - z.
+0.4 is taken as long as the joints hold, that is no point has passed its peak or moves by more than 0.01 δ_f in such a
+substep: joints and contacts of one block, which are springs beside one another, then stay stable together, 0.4² + 0.9²
+< 1. Else it is a tenth, which keeps the work of separation at any speed. It is a tenth from the start where k_c differs
+from k_0, since the leapfrog gains energy at the kink (bilinear law, k_c = 4 k_0: 0.02 % of it at a tenth, 0.6 % at
+0.4), and with the potential of Needleman, whose work is right only where an opening takes several substeps. A dashpot
+of ratio z shortens the limit by sqrt(1+z²) - z.
 
 For contacts the sum is over two faces of a block, those for which the limit is shortest: a block between two others, or
 in the corner of a tank. The n_f nodes p of a face f, at the arms r_p, share its stiffness K:
@@ -50,9 +51,11 @@ from yade_scripts.blocks.tangent import assemble, joint_springs
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.nodes import block_nodes
 
-JOINT_SHARE = 0.4
-KINK_SHARE = 0.1
-"""Of the explicit limit of joints, where all close as stiffly as they open, and where one does not."""
+HOLDING_SHARE = 0.4
+SOFTENING_SHARE = 0.1
+"""Of the explicit limit of joints: as long as they hold, and else."""
+QUIET = 0.01
+"""Largest growth of λ/δ_f in a substep of joints that hold."""
 CONTACT_SHARE = 0.2
 """Of √(m/K), which is 2/ω of a chain of equal blocks in contact that move along their normals, ω² ≤ 4 K/m."""
 STABLE_SHARE = 0.9
@@ -278,8 +281,11 @@ def substep_limit(
     law: ContactLaw | None = None,
     contact_stable: Array | None = None,
     asleep: Array | None = None,
+    holding: bool = False,
 ) -> SubstepLimit:
     """The substep that joints and contacts allow, and the explicit limit.
+
+    holding: whether the joints hold, as the module says.
 
     face_stiffness (n,) [N/m] · asleep (n,) bool: blocks that do not count, None: all do
     damping: ζ of joints; a dashpot in parallel shortens the limit of the explicit scheme by √(1 + ζ²) - ζ
@@ -290,7 +296,7 @@ def substep_limit(
         stable = 2.0 / omega * _dashpot_share(damping)
         other = blocks[joints.b[j]].name if joints.b[j] >= 0 else "ground"
         text = f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s"
-        share = JOINT_SHARE if joints.closes_as_it_opens() else KINK_SHARE
+        share = HOLDING_SHARE if holding else SOFTENING_SHARE
         best = SubstepLimit(dt=share * stable, what=text, omega=omega, stable=stable, stable_what=text)
     if law is not None and len(blocks):
         passed = np.zeros(len(blocks), bool) if asleep is None else asleep

@@ -111,9 +111,8 @@ class Joints:
         self._keeps_out = np.array([law.uplift == "none" for law in laws], bool)
         self._by_damage = np.array([law.uplift == "damage" for law in laws], bool)
         self._peak = np.array([law.peak_share for law in laws])
-        self._kinked = np.array(
-            [law.closing_ratio != 1.0 or law.mixed_mode != "effective" for law in laws], bool
-        )
+        kinked = np.array([law.closing_ratio != 1.0 or law.mixed_mode != "effective" for law in laws], bool)
+        self._most_held = np.where(kinked, -np.inf, self._peak * self.df)
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
         self.stiffness_on: tuple[Array, Array] | None = None
@@ -214,9 +213,13 @@ class Joints:
     def _list_visited(self) -> None:
         self.visited = self.live[~self.resting[self.live]] if self.resting.any() else self.live
 
-    def closes_as_it_opens(self) -> bool:
-        """Whether opening and closing act on each other in no joint, and both begin with the same stiffness."""
-        return not self._kinked[self.visited].any()
+    def holding(self) -> bool:
+        """Whether all points close as stiffly as they open, by the effective opening, and none is beyond its peak."""
+        return kernel.holding(self.visited, self.start, self.largest, self._most_held)
+
+    def pace(self, x: Array, v: Array, R: Array) -> float:
+        """Largest relative speed of the points that substeps visit, over their opening at failure [1/s]."""
+        return kernel.pace(self.visited, self._of_law(0.0), Placement(x, v, R))
 
     def visited_points(self) -> Array:
         """Points of the joints that are alive and do not rest."""

@@ -21,7 +21,8 @@ import numpy as np
 
 from kernels.decorators import inlined, kernel, plain
 from kernels.lanes import for_both
-from yade_scripts.blocks.kinematics import add_forces, dot, place, turned
+from yade_scripts.blocks.kinematics import add_forces, dot, parting, place, turned
+from yade_scripts.joints.arrays import DF
 
 
 @for_both
@@ -85,6 +86,30 @@ def broken(live, start, largest, df):
                 break
         dead[i] = gone
     return dead
+
+
+@kernel
+def holding(live, start, largest, most):
+    """Whether no point of the live joints has opened beyond most (J,) [m]."""
+    for j in live:
+        for p in range(start[j], start[j + 1]):
+            if largest[p] > most[j]:
+                return False
+    return True
+
+
+@kernel
+def pace(live, joints, motion):
+    """Largest relative speed of the points of the live joints, over the opening at failure [1/s]; joints: JointPoints,
+    motion: Placement."""
+    a, b, start, xi_a = joints.a, joints.b, joints.start, joints.xi_a
+    x, v, R = motion.x, motion.v, motion.R
+    largest = 0.0
+    for j in live:
+        for p in range(start[j], start[j + 1]):
+            apart = parting(a[j], b[j], x, v, place(a[j], R, x, xi_a[p]))
+            largest = max(largest, np.sqrt(dot(apart, apart)) / joints.law[j, DF])
+    return largest
 
 
 @plain
