@@ -271,6 +271,7 @@ class Cushions:
 
     def matrix(self, matrix, dt: float):
         """The matrix (n, n) of the water with the rows of the pockets behind it, csr (n + K, n + K)."""
+        assert self.links is not None  # `beside` has set them
         total = np.asarray(self.links.sum(axis=0)).ravel()
         own = sp.diags_array(self.compliance(dt) + total)
         if self.leak is not None:

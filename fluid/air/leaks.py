@@ -65,8 +65,8 @@ class Openings:
         """Vents and cracks of the pockets with the labels (N,)."""
         total: dict[tuple[int, int], float] = {}
         for one, other, area in _ways(water, label):
-            ends = max(one, other) - 1, min(one, other) - 1
-            total[ends] = total.get(ends, 0.0) + area
+            way = max(one, other) - 1, min(one, other) - 1
+            total[way] = total.get(way, 0.0) + area
         ends = np.array(sorted(total), np.int64).reshape(-1, 2)
         return cls(
             ends[:, 0], ends[:, 1], np.array([total[one, other] for one, other in ends.tolist()], float)

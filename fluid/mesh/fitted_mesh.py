@@ -106,7 +106,7 @@ def fitted_mesh(
     mesh = Background.from_arrays(columns.nodes, cells, (x, y, z), straddling=True, lattice=columns.lattice())
     on_bed = np.zeros(len(columns.nodes), bool)
     on_bed[columns.start[:-1][used.ravel()]] = True
-    bed_face = on_bed[mesh.boundary_faces].all(axis=1)
+    bed_face = np.all(on_bed[mesh.boundary_faces], axis=1)
     return FittedMesh(
         mesh=mesh,
         on_bed=on_bed,

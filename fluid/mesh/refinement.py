@@ -5,6 +5,7 @@ mesh = refined_mesh(box_mesh((0, 0, 0), (8, 4, 4), 0.5), [InBox((3, 1, 0), (5, 3
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,7 @@ class OnBed:
 
     bed(x, y) → z [m] at (n,), (n,) [m] · lowest, highest [m] · height [m] · levels as above."""
 
-    bed: object
+    bed: Callable[[Array, Array], Array]
     lowest: float
     highest: float
     height: float
@@ -169,9 +170,9 @@ def _bin_walls(axes, mesh: Tetrahedra):
     low, high = _boxes_of(mesh)
     for share in (1.0, 2.0, 4.0, 8.0, 16.0):
         found = tuple(_divided(axis, low[:, k], high[:, k], share) for k, axis in enumerate(axes))
-        listed = 1.0
+        listed = np.ones(len(low))
         for k, axis in enumerate(found):
-            listed = listed * (1.0 + bin_of(axis, high[:, k]) - bin_of(axis, low[:, k]))
+            listed *= 1.0 + bin_of(axis, high[:, k]) - bin_of(axis, low[:, k])
         if listed.mean() <= MOST_ENTRIES:
             break
     return found

@@ -84,7 +84,7 @@ def solve_bounded(
             rounds=1,
         )
     held = np.zeros(len(b), bool) if at_bound is None else at_bound.copy()
-    scale = np.linalg.norm(b)
+    scale = float(np.linalg.norm(b))
     if scale == 0.0 and not held.any() and not (lower > 0.0).any():
         return BoundedResult(
             x=np.zeros_like(b),

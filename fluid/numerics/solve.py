@@ -88,7 +88,7 @@ def conjugate_gradients(
     held (n,) bool: unknowns that keep their value, and whose rows do not count; None: all are free.
     enough: called with x after every iteration; True ends the iteration there.
     Raises NotConverged."""
-    scale = np.linalg.norm(b) or 1.0
+    scale = float(np.linalg.norm(b)) or 1.0
     free = _all if held is None else partial(_without, held)
     r = free(b - apply(x))
     history = [_length(r) / scale]

@@ -76,7 +76,7 @@ class Corrected:
     at_bound: Bools
     ventilated: Bools
     given_by_films: Floats
-    report: object
+    report: StepReport
 
 
 def corrected(water, problem, x, parting) -> Corrected:

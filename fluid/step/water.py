@@ -44,6 +44,10 @@ from fluid.surface.level_set import FAR, drain_films
 from fluid.surface.volume import nodal_volume
 
 if TYPE_CHECKING:
+    import scipy.sparse as sp
+
+    from fluid.pressure.films import Films
+    from fluid.pressure.slits import Slits
     from fluid.viscous.viscosity import FreeBodies
 
 
@@ -88,7 +92,9 @@ class Water:
         """The volume, and the arrays that it was summed from: a step replaces them by new ones."""
         self.report: StepReport | None = None
         self.sides = sides
-        self.slits, self.films, self._film_rules = None, None, None
+        self.slits: Slits | None = None
+        self.films: Films | None = None
+        self._film_rules: tuple | None = None
         self.reference = mesh.bounds.mean(axis=0)
         """Point (3,) [m] that angular momentum is taken about."""
         self._lowest = float((mesh.bounds * self.parameters.weight).max(axis=0).sum())
@@ -146,7 +152,8 @@ class Water:
         self.start_speed = 0.0
         if velocity is not None:
             start_moving(self, velocity)
-        self.renumbered, self.left_behind = None, None
+        self.renumbered: sp.csr_array | None = None
+        self.left_behind: tuple[Floats, Floats, Floats, Topology] | None = None
         self.flux = flux_at_start(self)
 
     def set_cell_velocity(self, velocity) -> None:
@@ -314,8 +321,10 @@ class Water:
 
         rules = (self.domain, np.array(loose), *share)
         known = self._film_rules
-        same = known is not None and known[0] is self.domain
-        if not same or not all(np.array_equal(a, b) for a, b in zip(known[1:], rules[1:])):
+        same = known is not None and (
+            known[0] is self.domain and all(np.array_equal(a, b) for a, b in zip(known[1:], rules[1:]))
+        )
+        if not same:
             self.films = Films.of(self.domain, self.topology, rules[1], share)
             self._film_rules = rules
 
@@ -376,7 +385,7 @@ class Water:
             self.sides.place(domain, self.topology.active)
         self._domain_is_new = True
         self._wall_area: Array | None = None
-        self.graph = None
+        self.graph: Graph | None = None
 
     def find_band(self) -> None:
         """The nodes that the step works on: the water and the layers around it."""
@@ -516,10 +525,12 @@ class Water:
 
     def pocket_volumes(self) -> Array:
         """Volume (K,) [m³] of the pockets of trapped air at the end of the last step."""
+        assert self.air is not None  # without trapped air nothing asks for its pockets
         return self.air.volumes(self.topology, self.level_set, self.coupling @ self.moved_by_end.ravel())
 
     def pocket_bounds(self, pocket: int) -> Array:
         """Lower and upper corner (2, 3) [m] of the box around the nodes of a pocket, 0 ... K-1."""
+        assert self.air is not None  # see above
         nodes = self.topology.nodes[self.air.label == pocket + 1]
         return np.array([nodes.min(axis=0), nodes.max(axis=0)])
 

@@ -108,6 +108,8 @@ class Carried:
         """The same with the velocity of fast water, too, only where that around jumps counts."""
         if self.velocity is None:
             return self
+        assert self.weight is not None  # they are given with the velocity
+        assert self.fast is not None
         none = np.zeros_like(self.fast)
         return replace(self, weight=np.maximum(self.weight, self.fast), fast=none, near_fast=none)
 
@@ -117,7 +119,8 @@ class Carried:
         if self.velocity is None:
             return Carried(water, swept=swept)
         held = np.maximum(self.water, 0.0)[:, None]
-        fields = np.column_stack([self.velocity, self.weight, self.fast, self.jumps])
+        given = (self.velocity, self.weight, self.fast, self.jumps)
+        fields = np.column_stack([np.asarray(field) for field in given])
         fields = (heirs @ (held * fields)) / np.maximum(heirs @ held, 1e-300)
         weight, fast, jumps = (fields[:, k].copy() for k in (3, 4, 5))
         near_fast = np.minimum(heirs @ self.near_fast, 1.0)  # dry nodes have it, too

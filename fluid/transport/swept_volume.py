@@ -57,8 +57,8 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
         _in_reach, len(around), around, phi, t.node_size, t.cells, flux.velocity, velocity, beside
     )
     after, near = copied(phi), taken(beside)
-    state = ((counted, flux.velocity, velocity), phi, u, dt, t.paths, t.volume)
-    over(_after, len(near), near, *state, after, weight=WORK)
+    before = ((counted, flux.velocity, velocity), phi, u, dt, t.paths, t.volume)
+    over(_after, len(near), near, *before, after, weight=WORK)
     over(_by_share, len(reached), reached, phi, after, t.parts, flux.velocity, velocity, beside)
     nodes = found_over(_those_in, len(flux.nodes), flux.nodes, beside)
     rate = edge_rates(t, g, nodes, velocity)
