@@ -86,9 +86,12 @@ except e.YadeMissing as error:
     assert f"SURGEBREAK_YADE = {tmp_path} holds no YADE" in out
 
 
-def test_the_wrong_package_called_yade_is_named(tmp_path):
+@pytest.mark.parametrize("is_package", [True, False], ids=["package", "folder"])
+def test_the_wrong_package_called_yade_is_named(tmp_path, is_package):
+    """A mere folder of this name, too, which Python imports as a package without a file."""
     (tmp_path / "yade").mkdir()
-    (tmp_path / "yade" / "__init__.py").write_text("")
+    if is_package:
+        (tmp_path / "yade" / "__init__.py").write_text("")
     out = run(f"""
 import sys
 sys.path.insert(0, {str(tmp_path)!r})

@@ -32,7 +32,7 @@ def taking(law, mixed_mode, instead=None):
     name, names = functions_of(law, laws.find(law), mixed_mode)
     if instead is not None:
         names |= {"four_points": instead}
-    return specialised(joint_forces, f"{name}_{instead is None}", cache=False, **names)
+    return specialised(joint_forces, f"{name}_{instead is None}", names, cache=False)
 
 
 def column(points, law, mixed_mode):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,8 @@ BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1
 """Corners of each face seen from outside, in the order -x +x -y +y -z +z."""
 
 
+FROM_SIZE: Any = None
+"""Vertices and faces of a box until it is made: every block has both."""
 BOX_NORMALS = np.repeat(np.eye(3), 2, axis=0) * np.array([-1.0, 1.0] * 3)[:, None]
 
 
@@ -51,8 +54,8 @@ class Block:
     name: str
     centre: Floats
     size: Floats | None = None
-    vertices: Floats | None = None
-    faces: Faces | None = None
+    vertices: Floats = FROM_SIZE
+    faces: Faces = FROM_SIZE
     rotation: Floats = field(default_factory=lambda: np.eye(3))
     density: float = 2400.0
     group: str = "block"
@@ -120,7 +123,11 @@ class Block:
     @cached_property
     def volume(self) -> float:
         """[m³]"""
-        return float(np.prod(self.size)) if self.is_box else polyhedron_moments(self.vertices, self.faces)[0]
+        return (
+            float(np.prod(self.size))
+            if self.size is not None
+            else polyhedron_moments(self.vertices, self.faces)[0]
+        )
 
     @property
     def mass(self) -> float:
@@ -130,7 +137,7 @@ class Block:
     @cached_property
     def inertia(self) -> Array:
         """(3, 3) [kg m²] about the centre of mass, body frame."""
-        if self.is_box:
+        if self.size is not None:
             s = self.size**2
             return self.mass / 12.0 * np.diag([s[1] + s[2], s[0] + s[2], s[0] + s[1]])
         second = polyhedron_moments(self.vertices, self.faces)[2]
@@ -139,7 +146,7 @@ class Block:
     @cached_property
     def planes(self) -> tuple[Array, Array]:
         """Outward normals (f, 3) and offsets (f,) of the faces, body frame: inside is normals @ x <= offsets."""
-        if self.is_box:
+        if self.size is not None:
             return BOX_NORMALS, 0.5 * np.repeat(self.size, 2)
         return face_planes(self.vertices, self.faces)
 

@@ -102,8 +102,8 @@ class _Layout(NamedTuple):
         corner += np.repeat([0, 6 * 12 + 6, 6, 6 * 12], [len(keys), *[len(both)] * 3])
         listed = sp.csr_array(_entries(rows, columns, corner, n), shape=(6 * n, 6 * n))
         listed.sort_indices()
-        source = listed.data.astype(np.int64)
-        return cls(pair, len(keys), *_distinct(listed.indptr, listed.indices), source)
+        indptr, indices, start = _distinct(listed.indptr, listed.indices)
+        return cls(pair, len(keys), indptr, indices, start, listed.data.astype(np.int64))
 
 
 def _assembled(springs: Springs, D: Array, layout: _Layout) -> sp.csr_array:

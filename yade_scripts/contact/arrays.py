@@ -66,12 +66,12 @@ class Direction(NamedTuple):
 
 
 class Faces(NamedTuple):
-    """Faces of b in the frame of a: planes (.., 4), of which the first `count` are in use: the depth of a point ξ
+    """Faces of b in the frame of a: planes (.., 4), of which the first `used` count: the depth of a point ξ
     behind face g is planes[g, 3] - planes[g, :3]·ξ · farthest: the face before which the nodes of a lie farthest out ·
     margin [m] by which a node may lie beside a face."""
 
     planes: Array
-    count: int
+    used: int
     farthest: int
     margin: float
 

@@ -18,6 +18,7 @@ from yade_scripts.contact.arrays import (
     Law,
     Pairs,
     Parted,
+    Rows,
     Slots,
     empty_rows,
 )
@@ -42,6 +43,9 @@ class ContactForces:
     ended; driving, the energy put in by driven blocks.
     """
 
+    _pairs: Pairs
+    _rows: Rows
+
     def __init__(
         self,
         blocks: list[Block],
@@ -57,8 +61,8 @@ class ContactForces:
         """As in `contact_forces`."""
         self._motion, self._neighbours, self._reach = motion, neighbours, reach
         self._planes = planes
-        uneven = [row for row, plane in enumerate(planes) if isinstance(plane, GroundSurface)]
-        self._ground = planes[uneven[0]].as_row(len(blocks) + uneven[0]) if uneven else NO_GROUND
+        uneven = (p.as_row(row) for row, p in enumerate(planes, len(blocks)) if isinstance(p, GroundSurface))
+        self._ground = next(uneven, NO_GROUND)
         self._n = len(blocks)
         self._shapes = contact_shapes(blocks, planes, law.nodes_per_edge)
         names = [b.material for b in blocks] + [p.material for p in planes]
@@ -80,7 +84,8 @@ class ContactForces:
         self._comers = np.zeros((0, 2), np.int64)
         self._joined = np.zeros(0, np.int64)
         self._set_pairs(np.zeros((0, 2), np.int64))
-        self._count, self._read = 0, None
+        self._count = 0
+        self._read: Contacts | None = None
         self._moved = 0.0
         self.dashpot = self.friction = self.driving = 0.0
 
@@ -164,7 +169,7 @@ class ContactForces:
         """(k,) bool: whether the boxes around blocks `rows` (k,) are within `way` [m] of those of `groups` (k,)."""
         reach = self._shapes.radius[rows, None] + way
         x, boxes = self._motion.x[rows], self._boxes[groups]
-        return ((x - reach <= boxes[:, 1]) & (x + reach >= boxes[:, 0])).all(axis=1)
+        return np.all((x - reach <= boxes[:, 1]) & (x + reach >= boxes[:, 0]), axis=1)
 
     def approached_groups(self) -> Array:
         """(groups,) bool: sleeping groups of blocks that a loose body has approached."""

@@ -9,7 +9,7 @@ across a ridge rests on its nodes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -44,9 +44,10 @@ class GroundSurface(FixedPlane):
     from `point`, at or above it · mirrored: squares with i + j odd are split from (1, 0) to (0, 1), all others from
     (0, 0) to (1, 1). Beyond its edges it is level, outwards at the height of the edge."""
 
-    x: Array = None
-    y: Array = None
-    z: Array = None
+    _: KW_ONLY
+    x: Array
+    y: Array
+    z: Array
     mirrored: bool = False
 
     @cached_property
@@ -61,8 +62,8 @@ class GroundSurface(FixedPlane):
 
     def as_row(self, row: int) -> Ground:
         """The ground as the kernel takes it, as the body with this row."""
-        arrays = (np.ascontiguousarray(a, float) for a in (self.x, self.y, self.z))
-        return Ground(row, *arrays, self.mirrored, self.upright)
+        x, y, z = (np.ascontiguousarray(a, float) for a in (self.x, self.y, self.z))
+        return Ground(row, x, y, z, self.mirrored, self.upright)
 
     def distance(self, points: Array) -> Array:
         """Lower bound (k,) [m] of the distance of points (k, 3) from the ground, negative below it."""

@@ -67,7 +67,8 @@ def block_nodes(block: Block, per_edge: int) -> tuple[Array, list[list[int]]]:
 
     Vertices, then per_edge - 2 points along each edge, then the middles of the faces.
     """
-    points, holders = [*block.vertices], [[] for _ in block.vertices]
+    points = [*block.vertices]
+    holders: list[list[int]] = [[] for _ in block.vertices]
     for number, face in enumerate(block.faces):
         for i in face:
             holders[i].append(number)
@@ -106,14 +107,14 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         kinds.append(_of_plane(plane))
     of = np.array(of_body, np.int64)
     nodes, faces, edges = (
-        _starts([len(k[column]) for k in kinds])
-        for column in (_Kind._fields.index(name) for name in ("nodes", "normals", "ends"))
+        _starts([len(part) for part in parts])
+        for parts in ([k.nodes for k in kinds], [k.normals for k in kinds], [k.ends for k in kinds])
     )
     holding = [[first + f for f in held] for k, first in zip(kinds, faces) for held in k.holders]
     holders = np.array([f for held in holding for f in held], np.int64)
     node_start, face_start, edge_start = nodes[:-1][of], faces[:-1][of], edges[:-1][of]
     inner = np.array([b.planes[1].min() for b in blocks] + [np.inf] * len(planes))
-    half = [0.5 * b.size if b.is_box else np.full(3, np.nan) for b in blocks]
+    half = [np.full(3, np.nan) if b.size is None else 0.5 * b.size for b in blocks]
     return Shapes(
         node_start=node_start,
         node_end=nodes[1:][of],

@@ -27,7 +27,7 @@ def share_of_overlap(shapes, a, own, b, g, faces, state):
             xi = shapes.node[i]
             d = planes[g, 3] - planes[g, 0] * xi[0] - planes[g, 1] * xi[1] - planes[g, 2] * xi[2]
             inside = True
-            for h in range(faces.count):
+            for h in range(faces.used):
                 aside = planes[h, 3]
                 for k in range(3):
                     aside -= planes[h, k] * (xi[k] + d * planes[g, k])

@@ -121,7 +121,7 @@ def scan(shapes, bodies, law, slots, slot, side, faces, pairs, p, reach, state, 
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
         nearest = faces.farthest
         smallest = _behind(planes, nearest, xi0, xi1, xi2)
-        for g in range(faces.count):
+        for g in range(faces.used):
             if smallest < -margin:
                 break
             depth = _behind(planes, g, xi0, xi1, xi2)
@@ -352,7 +352,7 @@ def _entered(shapes, i, xi0, xi1, xi2, faces, smallest):
     outside."""
     planes, normal = faces.planes, shapes.normal
     face, own, best = -1, -1, np.inf
-    for g in range(faces.count):
+    for g in range(faces.used):
         depth = _behind(planes, g, xi0, xi1, xi2)
         if depth >= best:
             continue

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from array_types import Array
@@ -29,13 +27,13 @@ def local_origin(blocks: list[Block]) -> Array:
     """Origin (3,) [m] of local coordinates: zero, or near the blocks if large map coordinates would cost digits."""
     if not blocks:
         return np.zeros(3)
-    middle = np.mean([b.centre for b in blocks], axis=0)
+    middle = np.array([b.centre for b in blocks]).mean(axis=0)
     return np.round(middle) if np.abs(middle).max() > FAR else np.zeros(3)
 
 
 def moved_block(block: Block, shift: Array) -> Block:
     """The same block at another position."""
-    return replace(block, centre=block.centre + shift, vertices=None if block.is_box else block.vertices)
+    return block.changed(centre=block.centre + shift)
 
 
 def matched_stiffness(blocks: list[Block], joints: Joints | None) -> Array:

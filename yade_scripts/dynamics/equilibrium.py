@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial.transform import Rotation
 
 from array_types import Array
@@ -132,7 +132,7 @@ class Search:
         return csc_matrix(matrix[self._dofs, :][:, self._dofs])
 
 
-def factors(matrix):
+def factors(matrix) -> SuperLU | None:
     """Factors of a symmetric matrix if it is positive definite, else None.
 
     Pivots stay on the diagonal, so by Sylvester's law their signs are those of the eigenvalues."""

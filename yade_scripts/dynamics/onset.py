@@ -69,6 +69,7 @@ class ContactOnset:
 
     def of_failed(self, joints: Array) -> Array:
         """Rows that were not loose and have just lost one of `joints`."""
+        assert self._joints is not None  # one of them failed
         ends = np.concatenate([self._joints.a[joints], self._joints.b[joints]])
         ends = np.unique(ends[ends >= 0])
         return ends[~self.loose[ends]]

@@ -15,8 +15,11 @@ import scipy.sparse as sp
 
 from array_types import Array
 from yade_scripts.blocks import tangent
-from yade_scripts.blocks.faces import touching_faces
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane, touching_faces
+from yade_scripts.blocks.tangent import Springs
 from yade_scripts.contact.forces import ContactForces
+from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.state import Contacts, no_contacts, sum_on_blocks
 from yade_scripts.dynamics.energy import EnergySums, Masses
 from yade_scripts.dynamics.onset import ContactOnset
@@ -36,6 +39,9 @@ class StructureReadings:
 
     n: int
     time: float
+    blocks: list[Block]
+    planes: list[FixedPlane]
+    contact: ContactLaw | None
     mass: Array
     fixed: Array
     gravity: Array
@@ -155,7 +161,7 @@ class StructureReadings:
             return contacts
         return contacts + tangent.joint_tangent(self.joints, self._motion.x, self._motion.R, self.n)
 
-    def _with_joints(self, springs: tangent.Springs) -> tangent.Springs:
+    def _with_joints(self, springs: Springs) -> Springs:
         if self.joints is None:
             return springs
         return springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))
@@ -237,7 +243,8 @@ class StructureReadings:
         none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         glued = none if self.joints is None else self.joints.sealed_faces(m.x, m.R)
         lying = none if self._seals is None else self._seals.closed_faces(m.x, m.R)
-        return tuple(np.concatenate(two) for two in zip(glued, lying))
+        block, face, opening = (np.concatenate(two) for two in zip(glued, lying))
+        return block, face, opening
 
     def wet_joints(self) -> tuple[Array, Array, Array]:
         """Faces between which a live joint lets water: block (m,), face (m,), depth (m,) [m] by which they are in one

@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import SuperLU
 from scipy.spatial.transform import Rotation
 
 from array_types import Array
@@ -72,7 +73,7 @@ class Sleeper:
     pressed: Array
     holders: Array
     held_by: Array
-    factor: object
+    factor: SuperLU
     stored: float
     openings: Array
 
@@ -419,17 +420,20 @@ class Sleep:
         self._period[:] = saved["period"]
         self.wakes, self.falls = int(saved["counts"][0]), int(saved["counts"][1])
         self.put_to_rest = float(saved["counts"][2])
-        asleep, m = saved["asleep"].astype(bool), self._motion
+        asleep = saved["asleep"].astype(bool)
         known = {s.island.rows.tobytes(): s for s in self._sleepers}
         self._islands, self._sleepers = None, []
         for island in self.islands():
             if not asleep[island.rows[0]]:
                 continue
             old = known.get(island.rows.tobytes())
-            stands = old is not None and np.array_equal(old.x, m.x[island.rows])
-            stands = stands and np.array_equal(old.R, m.R[island.rows])
-            sleeper = old if stands else self._sleeper(island)
+            sleeper = old if old is not None and self._stands(old) else self._sleeper(island)
             assert sleeper is not None  # it had stiffness when it fell asleep just here
             self._sleepers.append(sleeper)
         self._scene.set_held(asleep)
         self._changed()
+
+    def _stands(self, sleeper: Sleeper) -> bool:
+        """Whether an island is exactly where it fell asleep."""
+        m, rows = self._motion, sleeper.island.rows
+        return np.array_equal(sleeper.x, m.x[rows]) and np.array_equal(sleeper.R, m.R[rows])

@@ -38,7 +38,7 @@ class StructureState:
 
     def arrays(self) -> dict[str, Array]:
         """Flat, for any file of named arrays: `numpy.savez(path, **state.arrays())`."""
-        flat = {}
+        flat: dict[str, Array] = {}
         for name, value in vars(self).items():
             if isinstance(value, dict):
                 flat |= {f"{name}/{inner}": np.asarray(v) for inner, v in value.items()}

@@ -125,7 +125,7 @@ class Structure(StructureReadings):
         )
         self._start_energy_sums(ramp)
         if sleep is not None and self.joints is not None:
-            self._set_sleep(sleep)
+            self._set_sleep(sleep, self.joints)
 
     # ---- setting up -----------------------------------------------------------------------------------------
 
@@ -211,14 +211,14 @@ class Structure(StructureReadings):
         )
         self._list_bodies()
 
-    def _set_sleep(self, share: float) -> None:
+    def _set_sleep(self, share: float, joints: Joints) -> None:
         from yade_scripts.dynamics.sleep import Sleep
 
         self._sleep = Sleep(
             share,
             self._scene,
             self._motion,
-            self.joints,
+            joints,
             self._contacts,
             self._onset,
             self._spin,
@@ -379,15 +379,15 @@ class Structure(StructureReadings):
         self._substepper.step(dt, self.time)
         self.time += dt
         broken = self.joints.broken_now() if self.joints is not None else np.zeros(0, np.int64)
-        if len(broken):
-            self._retire(broken)
+        if self.joints is not None and len(broken):
+            self._retire(self.joints, broken)
         if self.pause is not None:
             self.pause()
         return broken
 
-    def _retire(self, broken: Array) -> None:
+    def _retire(self, j: Joints, broken: Array) -> None:
         """Remove failed joints; contact takes over the part of their energy that was compression."""
-        m, j = self._motion, self.joints
+        m = self._motion
         m.read()
         energy = j.stored_between(m.x, m.R, *m.before(), which=broken)[broken]
         energy -= j.release(broken, m.x, m.R)
@@ -460,11 +460,11 @@ class Structure(StructureReadings):
         self._spin.restore(saved.lent_spin)
         self._onset.restore(saved.onset)
         self._energy_sums.restore(saved.sums)
-        if self.joints is not None:
+        if self.joints is not None and saved.joints is not None:
             self.joints.restore(saved.joints)
-        if self._contacts is not None:
+        if self._contacts is not None and saved.contacts is not None:
             self._contacts.restore(saved.contacts)
-        if self._sleep is not None:
+        if self._sleep is not None and saved.sleep is not None:
             self._sleep.restore(saved.sleep)
         self.set_load(saved.load)
 
@@ -488,7 +488,11 @@ class Structure(StructureReadings):
 
 
 def _with_ground(ground: float | None, planes) -> list[FixedPlane]:
-    floor = [] if ground is None else [FixedPlane((0.0, 0.0, ground), (0.0, 0.0, 1.0), "ground")]
+    floor = (
+        []
+        if ground is None
+        else [FixedPlane(np.array([0.0, 0.0, ground]), np.array([0.0, 0.0, 1.0]), "ground")]
+    )
     return [*floor, *planes]
 
 
@@ -515,8 +519,12 @@ class _Faces:
         if rules is None and (contact is None or not contact.keeps_water_out):
             return cls([], [], [], [], [], [])
         faces = touching_faces(blocks, planes)
-        laws = [None] * len(faces) if rules is None else rules.of_faces(faces, blocks, planes)
-        joined, sealed, partly, held_rows, resting = [], [], [], set(), set()
+        laws = rules.of_faces(faces, blocks, planes) if rules is not None else [None] * len(faces)
+        joined: list[tuple[TouchingFaces, JointParameters]] = []
+        sealed: list[TouchingFaces] = []
+        partly: list[tuple[TouchingFaces, float]] = []
+        held_rows: set[int] = set()
+        resting: set[int] = set()
         for face, law in zip(faces, laws):
             held = both_held(blocks, face)
             uplift = 1.0 if contact is None else contact.uplift_between(*_materials(blocks, planes, face))
@@ -542,6 +550,6 @@ class _Faces:
 
     def joints(self, blocks, rules: JointRules | None) -> Joints | None:
         """The joints; None where no faces are joined."""
-        if not self.joined:
+        if rules is None or not self.joined:
             return None
         return Joints(blocks, self.joined, rules.everywhere, rules.scattered(self.laws))

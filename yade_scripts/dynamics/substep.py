@@ -91,7 +91,7 @@ class Substepper:
             self._F += self._lift
             self._impulses.lift(dt, m.x, missing)
         self._joint_F[:] = 0.0
-        if len(self._joined):
+        if self._joints is not None and len(self._joined):
             growth = self._joints.forces(m.x, m.v, m.R, self._joint_F, dt, advance=True)
             self.fastest = max(self.fastest, growth)
             self._F += self._joint_F

@@ -175,7 +175,7 @@ def _stiffness_on_blocks(blocks: list[Block], joints) -> tuple[Array, Array]:
             root[i, 3:, 3:] = np.linalg.inv(np.linalg.cholesky(block.inertia)).T
     frame = np.array([b.rotation for b in blocks] + [np.eye(3)])
     normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal[:, 0])
-    yields = root.any(axis=(1, 2))
+    yields = np.any(root, axis=(1, 2))
     count = np.where(yields[joints.a] & yields[joints.b], 2.0, 1.0)[:, None, None]
     sides = ((joints.xi_a, joints.a), (joints.xi_b, joints.b))
     first, second = (
@@ -276,7 +276,7 @@ def _stiffness_of_faces(block: Block, per_edge: int) -> tuple[Array, Array, Arra
 def substep_limit(
     blocks: list[Block],
     joints,
-    face_stiffness: Array | None,
+    face_stiffness: Array,
     damping: float = 0.0,
     law: ContactLaw | None = None,
     contact_stable: Array | None = None,
@@ -298,7 +298,7 @@ def substep_limit(
         text = f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s"
         share = HOLDING_SHARE if holding else SOFTENING_SHARE
         best = SubstepLimit(dt=share * stable, what=text, omega=omega, stable=stable, stable_what=text)
-    if law is not None and len(blocks):
+    if law is not None and contact_stable is not None and len(blocks):
         passed = np.zeros(len(blocks), bool) if asleep is None else asleep
         best = _contact_substep(blocks, face_stiffness, law, np.where(passed, np.inf, contact_stable), best)
     return _driven_limit(blocks, joints, best)

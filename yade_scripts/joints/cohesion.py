@@ -11,6 +11,7 @@ Tractions, works and stiffnesses are per unit area of the joint.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -21,6 +22,7 @@ from array_types import Array
 from yade_scripts.blocks import quadrature
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.law import CohesiveLaw
+from yade_scripts.joints.specialise import in_python
 
 UPLIFTS = ("none", "damage", "full")
 
@@ -101,9 +103,9 @@ class JointParameters:
         """p, opening at T_max over δ_f."""
         return self.cohesive_law.peak if self.peak is None else self.peak
 
-    def _share(self, function, r: Array) -> Array:
+    def _share(self, function: Callable[[float, float], float], r: Array) -> Array:
         """A function of the law at r (n,) without dimensions, in plain Python: nothing to compile."""
-        return np.reshape([function.py_func(q, self.peak_share) for q in np.ravel(r)], np.shape(r))
+        return np.reshape([in_python(function)(q, self.peak_share) for q in np.ravel(r)], np.shape(r))
 
     @property
     def rule(self) -> quadrature.Rule:
@@ -115,7 +117,11 @@ class JointParameters:
     @property
     def stiffness(self) -> float:
         """k_0 [Pa/m]."""
-        return float(self._share(self.cohesive_law.secant, 0.0)) * self.strength / self.opening_at_failure
+        return (
+            float(self._share(self.cohesive_law.secant, np.zeros(())))
+            * self.strength
+            / self.opening_at_failure
+        )
 
     @property
     def closing_stiffness(self) -> float:
@@ -125,7 +131,7 @@ class JointParameters:
     @property
     def work_of_separation(self) -> float:
         """G_c [J/m²]."""
-        return float(self.work_of_opening(self.opening_at_failure))
+        return float(self.work_of_opening(np.array(self.opening_at_failure)))
 
     def secant_stiffness(self, largest: Array) -> Array:
         """k_s of the largest opening so far (n,) [m], zero from δ_f on   →   (n,) [Pa/m]."""

@@ -349,8 +349,8 @@ def _kernels(law: str, chosen: CohesiveLaw, mixed_mode: str) -> JointKernels:
     name, names = functions_of(law, chosen, mixed_mode)
     parts = (stored_between, lost, point_springs, point_tangents)
     return JointKernels(
-        specialised(joint_forces, name, ranged=True, **names),
-        *(specialised(part, name, **names) for part in parts),
+        specialised(joint_forces, name, names, ranged=True),
+        *(specialised(part, name, names) for part in parts),
     )
 
 
@@ -359,9 +359,9 @@ def functions_of(law: str, chosen: CohesiveLaw, mixed_mode: str) -> tuple[str, d
     names in the kernels."""
     mode = mixed_modes.find(mixed_mode)
     name = f"{law}_{mixed_mode}_{source_checksum(chosen.secant, chosen.work):08x}"
-    names = {"secant": chosen.secant, "work": chosen.work}
+    names: dict[str, Callable] = {"secant": chosen.secant, "work": chosen.work}
     for function in (softened, separation_work, torn_traction, softened_fours):
-        names[function.__name__] = specialised(function, name, cache=False, **names)
+        names[function.__name__] = specialised(function, name, names, cache=False)
     names |= {part: getattr(mode, part) for part in ("measure", "pace", "response", "stored")}
-    names["four_points"] = specialised(four_points, name, inlined=True, **names)
+    names["four_points"] = specialised(four_points, name, names, inlined=True)
     return name, names

@@ -88,7 +88,7 @@ class Joints:
         self.weight = np.concatenate([w for _, w in rules]) if n else np.zeros(0)
         place = np.concatenate([p for p, _ in rules]) if n else np.zeros((0, 3))
         self.joint_of = np.repeat(np.arange(n), np.diff(self.start))
-        self.area = np.bincount(self.joint_of, self.weight, minlength=n)
+        self.area = np.bincount(self.joint_of, self.weight, minlength=n).astype(float, copy=False)
         centre = np.array([b.centre for b in blocks]).reshape(-1, 3)
         R = np.array([b.rotation for b in blocks]).reshape(-1, 3, 3)
         corners = np.concatenate([f.polygon for f in faces]) if n else np.zeros((0, 3))

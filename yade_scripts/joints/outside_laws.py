@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from yade_scripts.joints.law import CohesiveLaw
+from yade_scripts.joints.specialise import in_python
 
 GROUP = "surgebreak.laws"
 VARIABLE = "SURGEBREAK_LAWS"
@@ -65,6 +66,8 @@ def register_file(path: Path | str) -> str:
     if path.suffix != ".py" or not path.is_file():
         raise BadLaw(f"{path}: no Python file; a law is a file NAME.py that offers LAW (docs/add_a_law.md)")
     spec = importlib.util.spec_from_file_location(f"surgebreak_law_{path.stem}", path)
+    assert spec is not None  # the name ends in .py
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # numba looks its functions up there
     try:
@@ -153,8 +156,8 @@ def _problem(law: CohesiveLaw, peak: float) -> str:
     """The requirement that the law misses for this peak; empty if it meets all."""
     r = np.unique(np.append(np.linspace(0.0, 1.0, POINTS), peak))
     try:
-        secant = np.array([float(law.secant.py_func(q, peak)) for q in r.tolist()])
-        work = np.array([float(law.work.py_func(q, peak)) for q in r.tolist()])
+        secant = np.array([float(in_python(law.secant)(q, peak)) for q in r.tolist()])
+        work = np.array([float(in_python(law.work)(q, peak)) for q in r.tolist()])
     except (ArithmeticError, TypeError, ValueError) as error:
         return f"cannot be evaluated for 0 <= r <= 1: {error}"
     T = secant * r

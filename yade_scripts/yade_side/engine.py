@@ -18,6 +18,7 @@ import os
 import shutil
 import sys
 from dataclasses import dataclass
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -111,13 +112,20 @@ def find_yade() -> Path:
     other = importlib.util.find_spec("yade")
     if other is not None:
         raise WrongYade(
-            f"the Python package 'yade' at {other.origin} is not the discrete element code YADE; "
+            f"the Python package 'yade' at {_place(other)} is not the discrete element code YADE; "
             "remove it (pip uninstall yade) and install the real one (apt install yade)"
         )
     raise YadeMissing(
         f"YADE is not installed (looked for {', '.join(PACKAGED)}); install it with 'apt install yade' on Debian 12, "
         "or let ./surgebreak do it; water-only cases run without it"
     )
+
+
+def _place(package: ModuleSpec | None) -> str:
+    """The file of a package, or its folder where that has no `__init__.py`."""
+    if package is None:
+        return "an unknown place"
+    return package.origin or next(iter(package.submodule_search_locations or ()), "an unknown place")
 
 
 def _is_yade(package: Path) -> bool:
@@ -161,9 +169,10 @@ def _import_yade(folder: Path) -> Engine:
     package = None
     try:
         package = importlib.import_module("yade")
-        if not Path(package.__file__).resolve().is_relative_to(folder):
+        place = _place(package.__spec__)
+        if not Path(place).resolve().is_relative_to(folder):
             raise WrongYade(
-                f"'yade' was imported from {package.__file__}, not from {folder}; remove it (pip uninstall yade)"
+                f"'yade' was imported from {place}, not from {folder}; remove it (pip uninstall yade)"
             )
         utils = importlib.import_module("yade.utils")
         wrapper = importlib.import_module("yade.wrapper")

@@ -102,7 +102,7 @@ class Scene:
     def _shape(self, block: Block):
         """Shape for the neighbour search: the box of the block or a sphere around it, enlarged by the margin of its
         faces."""
-        if block.is_box:
+        if block.size is not None:
             half = 0.5 * block.size + MARGIN * block.planes[1].min()
             return self.engine.utils.box(self._v(block.centre), self._v(half), mask=STANDING, color=WHITE)
         radius = (1.0 + MARGIN) * block.radius
@@ -151,8 +151,8 @@ class Scene:
         YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
         forces = self.O.forces
         F = np.ascontiguousarray(F)
-        deque(map(forces.addF, ids, _FORCES(F), _FOR_THIS_STEP), maxlen=0)
-        deque(map(forces.addT, ids, _MOMENTS(F), _FOR_THIS_STEP), maxlen=0)
+        deque(map(forces.addF, ids, _FORCES(F.data), _FOR_THIS_STEP), maxlen=0)
+        deque(map(forces.addT, ids, _MOMENTS(F.data), _FOR_THIS_STEP), maxlen=0)
         self.O.dt = dt
         self._spin_is_read[:] = False
         self.O.step()
@@ -199,6 +199,7 @@ class Scene:
     def neighbours(self) -> Array:
         """Pairs of rows (p, 2) whose bounding boxes at the present places come within the margin of one another, each
         moved by no more than that."""
+        assert self.collider is not None  # only blocks that may meet look for neighbours
         self.collider.doSort = True  # masks may have changed, and bodies may have been moved by hand
         self.collider()
         numbers = chain.from_iterable(map(_ENDS, self.O.interactions.all()))

@@ -143,10 +143,11 @@ def _storey_parts(b: Building, storey: int) -> list[_Part]:
     }
     preferred = ((x0 + t, x1 - t), (y0 + t, y1 - t), ())
     parts = []
-    for side, (low, high) in boxes.items():
+    for side, (corner, opposite) in boxes.items():
         edges = (np.inf, b.block, course) if side[0] == "x" else (b.block, np.inf, course)
         name = f"{b.name}-wall{storey}{side}"
-        parts.append(_Part(name, "wall", np.array([*low, foot]), np.array([*high, head]), edges, preferred))
+        low, high = np.array([*corner, foot]), np.array([*opposite, head])
+        parts.append(_Part(name, "wall", low, high, edges, preferred))
     if with_slab:
         kind = "roof" if storey == b.storeys - 1 else "floor"
         low, high = np.array([x0, y0, head]), np.array([x1, y1, head + b.slab])
@@ -180,10 +181,8 @@ def _part_cuts(part: _Part, axis: int, openings: list[Opening]) -> Array:
     """Cuts of a part along an axis: its ends, the borders of openings, preferred cuts, and equal blocks between."""
     low, high, edge = part.low[axis], part.high[axis], part.edges[axis]
     size = min(edge, high - low)
-    fixed = [low, high]
-    for opening in openings:
-        fixed += [c for c in (opening.lower[axis], opening.upper[axis]) if low < c < high]
-    fixed = _apart(fixed, SAME * size)
+    borders = [c for o in openings for c in (o.lower[axis], o.upper[axis]) if low < c < high]
+    fixed = _apart([low, high, *borders], SAME * size)
     preferred = [c for c in part.preferred[axis] if low < c < high and np.abs(fixed - c).min() > CLOSE * size]
     ends = _apart([*fixed, *preferred], SAME * size)
     pieces = [equal_cuts(start, end, edge)[:-1] for start, end in pairwise(ends)]

@@ -81,9 +81,8 @@ def _wall_plans(r: Ring, inner: Array, storey: int) -> Iterator[tuple[str, Array
     """Names and plans (4, 2) [m] of the blocks of a course."""
     for e in range(len(r.outline)):
         f = (e + 1) % len(r.outline)
-        share = np.linspace(0.0, 1.0, int(pieces(np.linalg.norm(r.outline[f] - r.outline[e]), r.block)) + 1)[
-            :, None
-        ]
+        length = float(np.linalg.norm(r.outline[f] - r.outline[e]))
+        share = np.linspace(0.0, 1.0, int(pieces(length, r.block)) + 1)[:, None]
         outside = (1 - share) * r.outline[e] + share * r.outline[f]
         inside = (1 - share) * inner[e] + share * inner[f]
         for n in range(len(share) - 1):
