@@ -89,10 +89,8 @@ def _around(maps: Maps, watch: Watch, rows: Array) -> tuple[float, float, float,
     near = near.ravel()
     arrival = maps.arrival[near][maps.arrival[near] != NEVER]
     first = float(arrival.min()) if len(arrival) else float("nan")
-    return (
-        *(float(getattr(maps, name)[near].max(initial=0.0)) for name in ("depth", "speed", "flux")),
-        first,
-    )
+    depth, speed, flux = (float(of[near].max(initial=0.0)) for of in (maps.depth, maps.speed, maps.flux))
+    return depth, speed, flux, first
 
 
 def _widest(axis: Array, low: float, high: float) -> float:

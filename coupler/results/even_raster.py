@@ -25,7 +25,7 @@ def even_raster(x: Array, y: Array, *values: Array) -> tuple[Array, Array, list[
         share = (MOST_POINTS / points) ** (1.0 / len(changed))
         for k in changed:
             ends, count = axes[k][[0, -1]], max(len((x, y)[k]), int(share * len(axes[k])))
-            axes[k] = np.linspace(*ends, count)
+            axes[k] = np.linspace(ends[0], ends[1], count)
     found = list(values)
     for k in changed:
         found = [_between(np.moveaxis(z, k, 0), (x, y)[k], axes[k], k) for z in found]

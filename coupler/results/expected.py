@@ -127,7 +127,7 @@ def windowed(time: Array, values: Array, start: float, end: float) -> tuple[Arra
 
 def _integral(time: Array, values: Array, entry: dict) -> float:
     grid, part = windowed(time, values, entry["from"], entry["to"])
-    return np.trapezoid(part, grid)
+    return float(np.trapezoid(part, grid))
 
 
 def _period(time: Array, values: Array, entry: dict) -> float:

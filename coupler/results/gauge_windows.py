@@ -25,7 +25,7 @@ class Windows:
 
     def __init__(self, impulse, mean_over: float | None):
         self.impulse, self.mean_over = impulse, mean_over
-        self.total = 0.0
+        self.total: Array = np.zeros(())
         self.peak = 0.0
         self._steps: deque = deque()
 
@@ -50,7 +50,7 @@ class Windows:
             self.total = self.total + max(within, 0.0) * np.nan_to_num(value)
             found += list(self.total)
         if self.mean_over:
-            mean = self._mean(time, dt, value)
+            mean = self._mean(time, dt, value, self.mean_over)
             self.peak = float(np.fmax(self.peak, np.linalg.norm(mean)))
             found += [*mean, self.peak]
         return found
@@ -62,13 +62,13 @@ class Windows:
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Restore the state that `save` returned."""
-        self.total, self.peak = saved["total"][()], float(saved["peak"])
+        self.total, self.peak = saved["total"], float(saved["peak"])
         self._steps = deque((float(row[0]), float(row[1]), row[2:].copy()) for row in saved["steps"])
 
-    def _mean(self, time: float, dt: float, value) -> Array:
+    def _mean(self, time: float, dt: float, value, over: float) -> Array:
         if np.isfinite(value).all():
             self._steps.append((time - dt, time, value))
-        start = time - self.mean_over
+        start = time - over
         while self._steps and self._steps[0][1] <= start:
             self._steps.popleft()
         spans = [(end - max(begin, start), v) for begin, end, v in self._steps]

@@ -50,7 +50,8 @@ def make_gauges(spec, bodies: Bodies) -> list[Gauge]:
     rows = bodies.rows_of[spec.on]
     mass = bodies.mass[rows]
     point = mass @ bodies.centre[rows] / mass.sum() if spec.about is None else np.array(spec.about)
-    tables = {f"loads_{spec.name}": GroupLoads(rows, point, bodies.parts, spec.impulse, spec.mean_over)}
+    tables: dict[str, GroupLoads | BlockLoads] = {}
+    tables[f"loads_{spec.name}"] = GroupLoads(rows, point, bodies.parts, spec.impulse, spec.mean_over)
     if spec.each_block:
         names = [bodies.names[row] for row in rows]
         each = BlockLoads(rows, names, bodies.centre[rows], bodies.parts, spec.every)

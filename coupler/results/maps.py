@@ -144,7 +144,9 @@ class Map:
 
 def read_map(path: Path) -> Map:
     """A map of a run. Raises OSError, ValueError or LookupError of a file that is not what `Maps` writes."""
-    head, rows, what = {}, [], ""
+    head: dict[str, float] = {}
+    rows: list[list[str]] = []
+    what = ""
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):
             what = line[1:].strip()
@@ -156,7 +158,7 @@ def read_map(path: Path) -> Map:
             rows.append(words)
     z = np.array(rows, float)[::-1]
     z[z == head["nodata_value"]] = np.nan
-    dx, dy = head.get("dx", head.get("cellsize")), head.get("dy", head.get("cellsize"))
+    dx, dy = (head[name] if name in head else head["cellsize"] for name in ("dx", "dy"))
     x, y = (
         head[f"{a}llcenter"] + d * np.arange(n) for a, d, n in (("x", dx, z.shape[1]), ("y", dy, z.shape[0]))
     )

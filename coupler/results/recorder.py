@@ -185,7 +185,7 @@ class Recorder:
         if self._structure:
             self._append_structure(record)
         if self._gauges:
-            values = {}
+            values: dict[str, float | None] = {}
             for gauge in self._together():
                 values |= gauge.read(c, record)
             self._gauges.append(time=record.time, **values)
@@ -298,7 +298,8 @@ class Recorder:
         cracks = crack_columns(structure) if structure else {}
         if cracks:
             write_cracks(self.cracks, cracks)
-            write_crack_surfaces(self.cracks.with_suffix(".vtu"), *structure.joint_polygons(), cracks)
+            corners, start = structure.joint_polygons()
+            write_crack_surfaces(self.cracks.with_suffix(".vtu"), corners, start, cracks)
 
     def verdict(self) -> dict | None:
         """The present verdict on the structure (coupler/verdict/judge.py); None without one, or where no block

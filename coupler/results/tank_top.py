@@ -36,7 +36,8 @@ class TankTop:
         self._top = np.flatnonzero(nodes[:, 2] >= self.height - NEAR * (self.height - low))
         self._places = nodes[self._top, :2]
         self._reached = REACHED * water.mesh.node_size[self._top]
-        self._domain, self._copies = None, []
+        self._domain: object = None
+        self._copies: list[tuple[Array, Array]] = []
         self._at_start = self._wet(water)
         self.first, self.place, self.share, self.share_at = NEVER, np.zeros(2), 0.0, NEVER
 

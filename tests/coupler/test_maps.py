@@ -161,6 +161,14 @@ def test_maps_of_stretched_columns_have_their_places(stretched, tmp_path):
     assert not np.isfinite(depth.z[bed.x > 513.0]).any()
 
 
+def test_a_map_without_the_size_of_its_cells_is_refused(tmp_path):
+    """As every other file that is no map of a run: callers catch LookupError, not TypeError."""
+    path = tmp_path / "depth.asc"
+    path.write_text("ncols 2\nnrows 1\nxllcenter 0\nyllcenter 0\nnodata_value -9999\n1 2\n")
+    with pytest.raises(LookupError, match="cellsize"):
+        read_map(path)
+
+
 def test_values_end_half_way_to_a_column_without_one():
     z = np.array([[1.0, 1.0], [3.0, 3.0], [np.nan, np.nan]])
     x, y, (even,) = even_raster(np.array([0.0, 4.0, 5.0]), np.arange(2.0), z)
