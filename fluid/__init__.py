@@ -5,9 +5,9 @@ Its chapters, each of which imports only those below it (import contracts in pyp
     step         one step of the water, split around the pressure solve                  theory 2.2
     readings     level, pressure, velocity and flux at places
     viscous      viscosity, no-slip and rough walls                                      theory 2.3
-    air          trapped air: pockets, their gas, cushions and leaks                     theory 2.6
+    air          trapped air: pockets, their gas, cushions and leaks                     theory 2.7
     pressure     the pressure system                                                     theory 2.2
-    transport    what velocity, level set and volume do along the flow                   theory 2.2, 2.5
+    transport    what velocity, level set and volume do along the flow                   theory 2.2, 2.6
     sides        walls, inflows and seas                                                 theory 2.4
     surface      level set and conservative volume                                       theory 2.2
     domain       the physical domain: covers, their numbering, the coupling matrix       theory 2.1

@@ -1,4 +1,4 @@
-"""What is carried with the flow: velocity, level set and volume (theory 2.2; stabilised forms 2.5).
+"""What is carried with the flow: velocity, level set and volume (theory 2.2; stabilised forms 2.6).
 
 advection, paths_in_solids                 semi-Lagrangian transport with the MacCormack correction
 velocity_transport, volume_transport       momentum and volume by the same fluxes, both conserved

@@ -27,7 +27,7 @@ surface, fast water and jumps follow the momentum of the volume (`surface_moment
 front of a dam break of three cells a column, a sheet of one cell, else gained 7 % of the energy.  The level set
 stays on paths: it is a distance near the surface only and has a kink in every film, which (1) rounds off; a splash then
 gains energy too (8 % at six cells a column), and the volume correction has more to do.  The pressure has its own
-stabilisation (theory 2.5).
+stabilisation (theory 2.6).
 """
 
 from __future__ import annotations

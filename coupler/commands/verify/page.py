@@ -31,7 +31,7 @@ NOTES = {
     "to 1.01 and 0.93 to 1.03. With a quarter of the step the plate of width D receives 2 % more on eight "
     "cells; the plate of width D/2 on four cells 11 %, from 0.94 to 1.05 of its force. Where cells are halved around "
     "the plate, both of its edges see the same diagonals; the place that is judged is the worst of four, and their "
-    "mean is within 1.5 % ([the diagonals](theory.md#fast-water)).",
+    "mean is within 1.5 % ([the diagonals](variants.md#the-edges-of-plates-in-jets)).",
     "P41": "The bore into two cells of still water is 5.5 % too slow (4.6 % with the correction of the level set "
     "spread over five cells in calm water, too), the one into four cells 4.4 %.",
     "P53": "Each swing is smaller than the reference by 0.02 to 0.03 of the drop height. Half of the step changes the "
@@ -76,7 +76,7 @@ ALWAYS = {
     "with which the run-up is eight cells high. There the run-up with the same three places of the beach (0.014 "
     "and 0.138 d are two thirds of the length and of the height of these cells) is 0.086, 0.084 and 0.087 d; the"
     " tip flickers, and the highest median over half a second is 0.083, 0.084 and 0.085 d. With cells of d/48 "
-    "the run-up is 0.079 to 0.087 d in five runs ([theory](theory.md#24a-cells-of-several-sizes-and-meshes-that-"
+    "the run-up is 0.079 to 0.087 d in five runs ([theory](theory.md#25-cells-of-several-sizes-and-meshes-that-"
     "end-on-a-bed)). Agreement within the limit is therefore evidence for a tongue on such cells, not for one "
     "that is thinner than a cell. Waves of this height ran up 0.075 d in the laboratory. On the fitted bed with "
     "8 layers the tongue is thinner than a cell, and the figure depends on where the columns lie: with beach and"
@@ -92,15 +92,16 @@ ALWAYS = {
     "[P39](#p39-spheric-test-2-levels) it lay between 0 and −131 Pa, and once at −354 Pa.",
     "P63": "Jets are 24 widths long, and the means are taken from 6 to 18 D/U: theory is that of an endless jet, and "
     "on one cell the plate receives in three steps what it lacked in the three before ([how long a jet has to "
-    "be](theory.md#fast-water)). What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth "
-    "runs back along the plate, a quarter of a cell with four cells over the jet. On two cells and one the force "
-    "depends on where jet and plate lie between the nodes, and a single place says little: the reported rows have "
-    "mean, standard deviation and worst of eight. [Theory](theory.md#fast-water) says where the load is lost.",
+    "be](variants.md#how-long-a-jet-has-to-be)). What is missed are sheets thinner than a cell: of a jet at 30 degrees "
+    "one fifteenth runs back along the plate, a quarter of a cell with four cells over the jet. On two cells and one "
+    "the force depends on where jet and plate lie between the nodes, and a single place says little: the reported rows "
+    "have mean, standard deviation and worst of eight, and [where the load is "
+    "lost](variants.md#where-a-sheet-on-two-cells-loses-its-load) was found by a balance of momentum.",
     "P61": "Cells at the shore are 8 cm wide. With the island moved by 0, 1, −1 and 10 mm along the wave an earlier "
     "version had 0.080, 0.078, 0.091 and 0.080 m facing the wave and 0.078, 0.090, 0.083 and 0.079 m in the lee, and "
     "another one 0.093 and 0.094 m. A part of that was a fault: once in a while the shift of the surface was solved "
     "wrongly on flat cells, and water that was going back rose by 3 cm in one step ([theory]"
-    "(theory.md#24a-cells-of-several-sizes-and-meshes-that-end-on-a-bed)). How much the figures depend on the place of "
+    "(theory.md#25-cells-of-several-sizes-and-meshes-that-end-on-a-bed)). How much the figures depend on the place of "
     "the island without it was not measured.",
 }
 """What has to be known to judge the figures of a case, whether it passes or not."""
