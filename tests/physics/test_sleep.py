@@ -125,6 +125,24 @@ def test_it_wakes_where_the_equilibrium_under_the_load_changes_a_traction_by_the
             assert s.asleep.all() == asleep
 
 
+def test_what_sleeps_on_a_held_block_still_presses_on_it():
+    """Two posts on a fixed slab, out of its middle: while they sleep, their joints give it the weight of both and its
+    moment, as in the balance of momentum and as a reaction."""
+    slab = Block("slab", (0, 0, -0.1), size=(2.0, 1.0, 0.2), fixed=True)
+    posts = [Block(name, (x, 0, 0.25), size=0.5) for name, x in (("left", -0.3), ("right", 0.7))]
+    with Structure([slab, *posts], None, LAW, sleep=SHARE) as s:
+        settle(s)
+        report = s.advance(5e-3)
+        assert s.asleep.tolist() == [False, True, True]
+        weight = posts[0].mass * G
+        pressed, about = report.impulses.joint[0], s.centre()[0]
+        assert pressed[2] == pytest.approx(-2.0 * weight * report.dt_s, rel=1e-6)
+        moment = report.impulses.about(about, report.impulses.joint)[0, 4]
+        assert moment == pytest.approx(0.4 * weight * report.dt_s, rel=1e-6)
+        assert s.reaction()[0, 2] == pytest.approx(2.0 * weight + slab.mass * G, rel=1e-6)
+        assert s.reaction()[0, 4] == pytest.approx(-0.4 * weight, rel=1e-6)
+
+
 def test_what_hangs_on_a_driven_block_does_not_sleep():
     """Its joint moves its end without any load on the block."""
     blocks = [

@@ -161,10 +161,9 @@ def scan_ground(
             plane[j] = R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2]
         plane[3] = depth + plane[0] * xi0 + plane[1] * xi1 + plane[2] * xi2
         if known and side.begins:
+            # on another triangle than before, a part of the spring may be normal to the ground: no friction
             across = slots.shear[s, 0] * n[0] + slots.shear[s, 1] * n[1] + slots.shear[s, 2] * n[2]
-            for k in range(
-                3
-            ):  # on another triangle than before, a part of it may be normal to the ground: no friction
+            for k in range(3):
                 slots.shear[s, k] -= across * n[k]
             lost += 0.5 * across**2 / (shear * slots.k[s])
             way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way)
