@@ -99,7 +99,7 @@ def test_the_energy_in_a_damaged_cpm_bond_is_half_of_force_times_opening(opening
     force, shear = np.array([left * kn * opening, 0.0, 0.0]), np.array([0.0, ks * sliding, 0.0])
     bond = SimpleNamespace(normalForce=force, shearForce=shear, omega=0.75, epsN=opening, kn=kn, ks=ks)
     expected = 0.5 * (abs(force[0] * opening) + ks * sliding**2)
-    assert cpm.stored(bond, {}) == pytest.approx(expected)
+    assert cpm.stored(bond) == pytest.approx(expected)
 
 
 def test_lourenco_envelope_has_three_borders():

@@ -88,7 +88,7 @@ def failed(phys):
     return not phys.isCohesive
 
 
-def stored(phys, numbers):
+def stored(phys):
     """Elastic energy [J]: with the secant stiffness in tension, the initial one in compression and shear."""
     n, s = phys.normalForce, phys.shearForce
     left = 1.0 - phys.omega if phys.epsN > 0.0 else 1.0

@@ -98,7 +98,7 @@ def add_block(block, spheres, stuff):
 
 
 def make_bonds(scene, pairs):
-    """Bonds [(interaction ends, area, joint, numbers of the law)], with exactly the numbers of `bond`."""
+    """Bonds [(first sphere, second sphere, joint)], with exactly the numbers of `bond`."""
     for first, second in pairs:
         utils.createInteraction(first, second)
     dt, O.dt = O.dt, NOTHING_MOVES
@@ -106,9 +106,8 @@ def make_bonds(scene, pairs):
     O.dt = dt
     made = []
     for (first, second), p in zip(pairs, scene["points"]):
-        numbers = bond(p["area"], scene["joint"], scene["variant"])
-        set_bond(O.interactions[first, second].phys, numbers)
-        made.append((first, second, p["joint"], numbers))
+        set_bond(O.interactions[first, second].phys, bond(p["area"], scene["joint"], scene["variant"]))
+        made.append((first, second, p["joint"]))
     return made
 
 
@@ -118,11 +117,11 @@ def measure(ids, members, bonds, last, failed_at):
     speed = max([math.hypot(*b["velocity"]) for b in SCENE["blocks"] if b["held"]], default=0.0)
     pull, kinetic, potential = pull_and_energies(ids, members, speed)
     elastic, whole, gone = 0.0, set(), 0
-    for first, second, joint, numbers in bonds:
+    for first, second, joint in bonds:
         listed = O.interactions.has(first, second, True)
         phys = O.interactions[first, second].phys if listed else None
         if listed:
-            elastic += stored(phys, numbers)
+            elastic += stored(phys)
         if listed and not failed(phys):
             whole.add(joint)
         else:

@@ -46,11 +46,5 @@ def set_bond(phys, numbers):
 
 
 def failed(phys):
-    """Whether a contact holds no tension: always true, since it has no cohesion."""
+    """Whether a contact counts as failed: never, since it has no cohesion to lose."""
     return False
-
-
-def stored(phys, numbers):
-    """Elastic energy [J]."""
-    n, s = phys.normalForce, phys.shearForce
-    return 0.5 * (n.dot(n) / phys.kn + s.dot(s) / phys.ks)

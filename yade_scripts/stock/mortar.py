@@ -87,9 +87,3 @@ def set_bond(phys, numbers):
 def failed(phys):
     """Whether a bond still listed holds no tension: always false, since broken bonds are removed."""
     return False
-
-
-def stored(phys, numbers):
-    """Elastic energy [J]."""
-    n, s = phys.normalForce, phys.shearForce
-    return 0.5 * (n.dot(n) / phys.kn + s.dot(s) / phys.ks)

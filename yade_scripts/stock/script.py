@@ -70,7 +70,8 @@ def stock_names() -> list[str]:
 
 
 def script_text(law: StockLaw, scene: dict) -> str:
-    """A script that `yade -x -n` runs: the scene (`scene.timed`), the file of the law, and the driver."""
+    """A script that `yade -x -n` runs: the scene (`scene.timed`), the energy of linear springs, the file
+    of the law, and the driver."""
     described = json.dumps(scene, indent=1)
     head = (
         f'"""{law.title} on the blocks of a case. Run with: yade -x -n {law.stem}.py\n\n'
@@ -84,8 +85,8 @@ def script_text(law: StockLaw, scene: dict) -> str:
     )
     data = described.replace("true", "True").replace("false", "False")
     parts = [head, f'LAW = "{law.stem}"\nSCENE = {data}\n']
-    parts += [(FOLDER / f"{law.name.partition(':')[0]}.py").read_text(encoding="utf-8")]
-    parts += [(FOLDER / "driver.py").read_text(encoding="utf-8")]
+    files = ("elastic", law.name.partition(":")[0], "driver")
+    parts += [(FOLDER / f"{file}.py").read_text(encoding="utf-8") for file in files]
     return "\n\n".join(parts)
 
 
