@@ -293,7 +293,7 @@ def reach_of_cells(cell_list, cells) -> Callable:
 
 def reach_of_rows(nodes, row, start, neighbour) -> Callable:
     """`reach` for `owning`, of the listed nodes (n,) and those at the other ends of their edges; row, start, neighbour:
-    of a `topology.Graph`."""
+    of a `graph.Graph`."""
     key = (nodes, row, start, neighbour)
     return lambda: _remembered(key, _row_reach, len(nodes), *key)
 

@@ -3,6 +3,7 @@
 covers, continued_nodes         unknowns for each connected part of a star; the old unknown that a new one continues
 physical_domain                 cells, moments and wetted surface, made from the cut
 topology                        the connectivity of nodes and cells, laid out for the kernels of a step
+incidence, graph                nodes and cells around one another; edges of listed nodes with their stiffness
 layers                          layers of nodes around others
 open_columns                    what solids leave of the columns of water
 cell_vectors                    vectors of those cells that have one, as a list

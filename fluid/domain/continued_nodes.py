@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
+from fluid.domain.incidence import first_rows
 from fluid.domain.moments import cells_touching
-from fluid.domain.topology import first_rows
 from kernels.decorators import inner, kernel
 
 

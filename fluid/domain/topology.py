@@ -8,21 +8,21 @@ in Python, and takes half the time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from array_types import Array, Bools, Floats, Integers, Ints
+from array_types import Array, Bools, Floats, Integers
 from fluid.domain.coupling_matrix import polygons_of_nodes
+from fluid.domain.incidence import cells_of_nodes, first_rows, joined_rows, neighbours_in, nodes_around, touch
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import FluidParts
-from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
+from fluid.mesh.arrays import FluidCells, Hats, Paths
 from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradient_rows
 from fluid.numerics.fields import marks_of
-from fluid.numerics.spans import spans
-from kernels.decorators import inner, kernel, ranged, released
+from kernels.decorators import kernel, released
 from kernels.threads import over, taken
 
 NO_WATER = 1e-9
@@ -77,7 +77,7 @@ class Topology:
         """Lay out a PhysicalDomain of the background mesh."""
         cells, background = domain.cells, domain.parent_cell
         nodes = np.ascontiguousarray(domain.nodes)
-        start, members = _cells_of_nodes(cells, len(nodes))
+        start, members = cells_of_nodes(cells, len(nodes))
         shapes = mesh.shapes
         divided = (np.bincount(domain.parent_node) > 1)[domain.parent_node]
         share, share_row, fraction, size, node_volume, beside_solid = _measures(
@@ -99,7 +99,7 @@ class Topology:
             size=size,
             node_start=start,
             node_cells=members,
-            neighbours=_neighbours_in(mesh, divided, cells, background),
+            neighbours=neighbours_in(mesh, divided, cells, background),
             node_volume=node_volume,
             covered=covered_nodes(domain),
             beside_solid=beside_solid,
@@ -195,7 +195,7 @@ class Topology:
         """`around`, and the number of cells that each of these neighbours shares with the node."""
         n = len(self.nodes)
         rows = (self.cells, self.node_start, self.node_cells)
-        return _concatenated(over(_nodes_around, n, *rows, weight=WORK, pieces=1))
+        return joined_rows(over(nodes_around, n, *rows, weight=WORK, pieces=1))
 
     @cached_property
     def near_solids(self) -> Array:
@@ -209,7 +209,7 @@ class Topology:
         only, apart from one byte a cell."""
         touched = self._touched
         try:
-            over(_touch, len(nodes), nodes, self.node_start, self.node_cells, touched)
+            over(touch, len(nodes), nodes, self.node_start, self.node_cells, touched)
             return taken(touched)
         except BaseException:
             del self._touched
@@ -301,263 +301,3 @@ def _measures(nodes, cells, parent, full, full_size, volume, part, moments):
                 beside_solid[cells[e, a]] = True
             node_volume[cells[e, a]] += volume[e] * share[r, a]
     return share, row, fraction, size, node_volume, beside_solid
-
-
-@kernel
-def first_rows(parent, n):
-    """First row (n + 1,) of each number below n in an ascending list (M,) of numbers; M at the end."""
-    start = np.zeros(n + 1, np.int32)
-    for e in range(len(parent)):
-        start[parent[e] + 1] += 1
-    for i in range(n):
-        start[i + 1] += start[i]
-    return start
-
-
-@kernel
-def _cells_of_nodes(cells, n):
-    start = np.zeros(n + 1, np.uint32)
-    for e in range(cells.shape[0]):
-        for a in range(4):
-            start[cells[e, a] + 1] += 1
-    for i in range(n):
-        start[i + 1] += start[i]
-    filled = start[:-1].copy()
-    members = np.empty(4 * cells.shape[0], np.uint32)
-    for e in range(cells.shape[0]):
-        for a in range(4):
-            i = cells[e, a]
-            members[filled[i]] = e
-            filled[i] += 1
-    return start, members
-
-
-def _neighbours_in(mesh, divided, cells, parent):
-    """neighbours (M, 4); where every node is its background node, those of the parents, renumbered. divided (N,) bool:
-    copies of a node that has several."""
-    if len(divided) > len(mesh.nodes):
-        found = np.full(cells.shape, -1, np.int32)
-        rows = first_rows(parent, len(mesh.cells))
-        over(_neighbours, len(cells), mesh.neighbours, cells, parent, rows, divided, found, weight=WORK)
-        return found
-    if cells is mesh.cells:
-        return mesh.neighbours
-    row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry stands for "no neighbour", -1
-    row[parent] = np.arange(len(parent), dtype=np.int32)
-    found = np.empty((len(parent), 4), np.int32)
-    for some in spans(len(parent)):
-        found[some] = row[mesh.neighbours[parent[some]]]
-    return found
-
-
-@ranged
-def _neighbours(first, last, parent_neighbours, cells, parent, start, divided, found):
-    """found (M, 4) ← copies of the parents' neighbours that share the three nodes of the face, where there are any.
-    Where no node of the cell has a further copy, the first copy of the neighbour is known to share them.
-
-    start (parents + 1,): first cell of each parent."""
-    for e in range(first, last):
-        alone = True
-        for a in range(4):
-            alone = alone and not divided[cells[e, a]]
-        for a in range(4):
-            p = parent_neighbours[parent[e], a]
-            if p < 0:
-                continue
-            if alone:
-                if start[p] < start[p + 1]:
-                    found[e, a] = start[p]
-                continue
-            for other in range(start[p], start[p + 1]):  # elements are in the order of their parents
-                shared = 0
-                for b in range(4):
-                    for c in range(4):
-                        if b != a and cells[other, c] == cells[e, b]:
-                            shared += 1
-                if shared == 3:
-                    found[e, a] = other
-                    break
-
-
-def _concatenated(parts):
-    """Concatenate rows that come in parts, each (start, values, values) → start (n + 1,) of all rows, and their
-    values."""
-    if len(parts) == 1:
-        return parts[0]
-    starts, first, second = zip(*parts)
-    before = np.cumsum([0, *(start[-1] for start in starts)])
-    start = np.concatenate([starts[0][:1], *(s[1:] + b for s, b in zip(starts, before))])
-    return start.astype(np.uint32), np.concatenate(first), np.concatenate(second)
-
-
-@released
-def _nodes_around(first, last, cells, node_start, node_cells):
-    """start (n + 1,), neighbours: nodes that share a cell with each node, in the order of its cells, and the number of
-    shared cells."""
-    n = last - first
-    start = np.zeros(n + 1, np.uint32)
-    slot = np.full(node_start.shape[0] - 1, -1, np.int64)
-    around, shared = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64, np.uint8)
-    row, count = _next_around(0, first, n, cells, node_start, node_cells, slot, start, around, shared)
-    while row < n:  # not where rows are filled: numba would count references to both arrays in every turn
-        more = around.shape[0] + _most_around(first + row, node_start)
-        around = np.concatenate((around, np.empty(more, np.uint32)))
-        shared = np.concatenate((shared, np.empty(more, np.uint8)))
-        row, count = _next_around(row, first, n, cells, node_start, node_cells, slot, start, around, shared)
-    return start, around[:count].copy(), shared[:count].copy()
-
-
-@inner
-def _most_around(i, node_start):
-    """More neighbours than node i can have."""
-    return 3 * (np.int64(node_start[i + 1]) - np.int64(node_start[i]))
-
-
-@inner
-def _next_around(row, first, n, cells, node_start, node_cells, slot, start, around, shared):
-    """Fill rows of `_nodes_around`, from one on, for as long as there is room; → the next row, and how many neighbours
-    there are so far."""
-    count = np.int64(start[row])
-    for r in range(row, n):
-        i, begun = np.uint64(first + r), count
-        if count + _most_around(first + r, node_start) > around.shape[0]:
-            return r, count
-        for t in range(node_start[i], node_start[i + np.uint64(1)]):
-            for a in range(4):
-                j = cells[node_cells[t], a]
-                if j == i:
-                    continue
-                if slot[j] < begun:
-                    slot[j], around[np.uint64(count)], shared[np.uint64(count)] = count, j, 1
-                    count += 1
-                else:
-                    shared[np.uint64(slot[j])] += 1
-        start[np.uint64(r + 1)] = count
-    return n, count
-
-
-@ranged
-def _touch(first, last, nodes, node_start, node_cells, touched):
-    """(M,) bool: cells around these nodes (N,) bool; several threads may mark one cell."""
-    for k in range(first, last):
-        i = np.uint64(k)
-        if nodes[i]:
-            for t in range(node_start[i], node_start[i + np.uint64(1)]):
-                touched[node_cells[t]] = True
-
-
-@dataclass(frozen=True)
-class Graph:
-    """Edges of the listed nodes with the stiffness of the physical domain.
-
-    row (N,) place of a node in `nodes`, -1 if not listed · start (n+1,), neighbour, stiffness [m]: CSR without
-    diagonal, K_ij = Σ_e volume_e ∇N_i·∇N_j · whole: all nodes of the domain that have cells are listed."""
-
-    nodes: Ints
-    row: Ints
-    start: Integers
-    neighbour: Integers
-    stiffness: Floats
-    whole: bool = False
-
-    @property
-    def edges(self) -> Edges:
-        """The edges as kernels take them."""
-        return Edges(self.row, self.start, self.neighbour, self.stiffness)
-
-    def covers(self, nodes) -> bool:
-        """Whether all these nodes (n,) are listed."""
-        return self.whole or sum(over(_listed_among, len(nodes), nodes, self.row)) == len(nodes)
-
-    @classmethod
-    def of(cls, topology: Topology, nodes) -> Graph:
-        """Edges around the given nodes (n,); cost grows with n only."""
-        t = topology
-        row = np.full(len(t.nodes), -1, np.int64)
-        row[nodes] = np.arange(len(nodes))
-        mesh = (t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells)
-        start, neighbour, stiffness = _concatenated(
-            over(_edges, len(nodes), nodes, *mesh, weight=WORK, pieces=1)
-        )
-        return cls(nodes, row, start, neighbour, stiffness)
-
-    def without(self, topology: Topology, cell_list) -> Graph:
-        """The same edges with the stiffness of the listed cells (k,) taken out."""
-        if len(cell_list) == 0:
-            return self
-        t, stiffness = topology, self.stiffness.copy()
-        found = replace(self, stiffness=stiffness)
-        _take_out(cell_list, t.cells, t.parent, t.products, t.volume, found.edges)
-        return found
-
-
-PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
-"""Column of Background.products that holds the corners a, b."""
-
-
-@kernel
-def _take_out(cell_list, cells, parent, products, volume, edges):
-    row, start, neighbour, stiffness = edges
-    for e in cell_list:
-        for a in range(4):
-            r = row[cells[e, a]]
-            if r < 0:
-                continue
-            for s in range(start[r], start[r + 1]):
-                for b in range(4):
-                    if b != a and neighbour[s] == cells[e, b]:
-                        stiffness[s] -= volume[e] * products[parent[e], PAIR[a, b]]
-
-
-@ranged
-def _listed_among(first, last, nodes, row):
-    count = 0
-    for s in range(first, last):
-        count += row[nodes[s]] >= 0
-    return count
-
-
-@released
-def _edges(first, last, rows, cells, parent, products, volume, node_start, node_cells):
-    n = last - first
-    slot = np.full(node_start.shape[0] - 1, -1, np.int64)
-    start = np.zeros(n + 1, np.uint32)
-    neighbour, stiffness = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64)
-    mesh = (cells, parent, products, volume, node_start, node_cells)
-    row, count = _next_edges(0, rows[first:last], *mesh, slot, start, neighbour, stiffness)
-    while row < n:  # as in `_nodes_around`
-        more = neighbour.shape[0] + _most_around(rows[first + row], node_start)
-        neighbour = np.concatenate((neighbour, np.empty(more, np.uint32)))
-        stiffness = np.concatenate((stiffness, np.empty(more)))
-        row, count = _next_edges(row, rows[first:last], *mesh, slot, start, neighbour, stiffness)
-    return start, neighbour[:count].copy(), stiffness[:count].copy()
-
-
-@inner
-def _next_edges(
-    row, nodes, cells, parent, products, volume, node_start, node_cells, slot, start, neighbour, stiffness
-):
-    """Fill rows of `_edges`, from one on, for as long as there is room; → the next row, and how many edges there are so
-    far."""
-    count = np.int64(start[row])
-    for r in range(row, nodes.shape[0]):
-        i, begun = np.uint64(nodes[r]), count
-        if count + _most_around(nodes[r], node_start) > neighbour.shape[0]:
-            return r, count
-        for t in range(node_start[i], node_start[i + np.uint64(1)]):
-            e = node_cells[t]
-            p, own = parent[e], np.uint64(0)
-            while cells[e, own] != i:
-                own += np.uint64(1)
-            for b in range(4):
-                if np.uint64(b) == own:
-                    continue
-                j = cells[e, b]
-                k = volume[e] * products[p, PAIR[own, b]]
-                if slot[j] < begun:
-                    slot[j], neighbour[np.uint64(count)], stiffness[np.uint64(count)] = count, j, k
-                    count += 1
-                else:
-                    stiffness[np.uint64(slot[j])] += k
-        start[np.uint64(r + 1)] = count
-    return nodes.shape[0], count

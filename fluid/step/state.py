@@ -12,7 +12,7 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.cell_vectors import CellVectors
-from fluid.domain.topology import Graph
+from fluid.domain.graph import Graph
 from fluid.surface.volume import FluxAhead
 
 NODAL = (

@@ -18,9 +18,10 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors
+from fluid.domain.graph import Graph
 from fluid.domain.layers import layers_around
 from fluid.domain.physical_domain import wetted_coupling
-from fluid.domain.topology import Graph, Topology
+from fluid.domain.topology import Topology
 from fluid.mesh.background import Background
 from fluid.numerics.fields import nothing
 from fluid.numerics.sums import kinetic_energy, total

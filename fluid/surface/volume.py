@@ -39,9 +39,9 @@ import scipy.sparse as sp
 
 from array_types import Floats, Ints
 from fluid.domain.cell_vectors import CellVectors
+from fluid.domain.graph import PAIR, Graph
 from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
-from fluid.domain.topology import PAIR, Graph
 from fluid.mesh.brick_sides import ALL, BEYOND, NONE
 from fluid.numerics.fields import added, copied, marks_of, places_of
 from fluid.numerics.sums import total

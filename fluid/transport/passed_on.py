@@ -24,7 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluid.domain.topology import NO_WATER, Graph
+from fluid.domain.graph import Graph
+from fluid.domain.topology import NO_WATER
 from fluid.numerics.fields import PLAIN
 from fluid.surface.shift import rows_of_shift
 from fluid.surface.volume import Shift

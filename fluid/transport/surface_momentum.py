@@ -41,7 +41,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from array_types import Array
-from fluid.domain.topology import NO_WATER, Graph, Topology
+from fluid.domain.graph import Graph
+from fluid.domain.topology import NO_WATER, Topology
 from fluid.numerics.fields import copied
 from fluid.surface.volume import Flux
 from fluid.transport.passed_on import pass_on

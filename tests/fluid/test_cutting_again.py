@@ -13,8 +13,8 @@ from fluid.cut import cut_arrays
 from fluid.cut import openings as contacts
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.covers import Connection, components, without_pockets
+from fluid.domain.incidence import first_rows
 from fluid.domain.physical_domain import cut_domain
-from fluid.domain.topology import first_rows
 from fluid.mesh.background import Background, box_mesh
 
 N = 6

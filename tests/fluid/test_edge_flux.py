@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fluid.cut.bodies import ConvexBodies
+from fluid.domain.graph import Graph
 from fluid.domain.physical_domain import cut_domain
-from fluid.domain.topology import Graph, Topology
+from fluid.domain.topology import Topology
 from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.surface.volume import edge_rates

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 from skfem import asm
 
 from fluid.cut.bodies import ConvexBodies
+from fluid.domain.graph import Graph
 from fluid.domain.moments import nodal_water
 from fluid.domain.physical_domain import cut_domain, wetted_coupling
-from fluid.domain.topology import Graph, Topology
+from fluid.domain.topology import Topology
 from fluid.mesh.background import Background, box_mesh
 from fluid.numerics.solve import solve
 from fluid.pressure.damping import Waterline, damp_divergence, damp_waterline

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fluid.cut.bodies import ConvexBodies
+from fluid.domain.graph import Graph
 from fluid.domain.physical_domain import cut_domain
-from fluid.domain.topology import Graph
 from fluid.mesh.background import box_mesh
 from fluid.mesh.refinement import InBox, refined_mesh
 from fluid.step.parameters import WaterParameters

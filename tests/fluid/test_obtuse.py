@@ -5,8 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
+from fluid.domain.graph import Graph
 from fluid.domain.physical_domain import cut_domain
-from fluid.domain.topology import Graph, Topology
+from fluid.domain.topology import Topology
 from fluid.mesh.background import Background, box_mesh
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
