@@ -1,10 +1,12 @@
 """Air that cannot leave: its gas, its pockets, and what they do to water and bodies."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
+from scipy.sparse import csr_array
 
 from fluid.air.cushions import Cushions
 from fluid.air.gas import AIR_DENSITY, Gas
@@ -451,6 +453,41 @@ def test_a_chamber_empties_through_its_vent_in_the_time_of_the_orifice():
     exact = solve_ivp(rate, (0, water.time), [volume * 1.1], rtol=1e-9, atol=1e-12).y[0, -1]
     np.testing.assert_allclose(water.air.reference[0] - volume, exact - volume, rtol=0.02)
     assert water.air.lost > 0.0
+
+
+def test_a_vent_that_lies_outside_of_the_tank_lets_out_nothing():
+    """As that of a body that has drifted over an open side; the same vent inside leads from the chamber to the air."""
+    mesh = box_mesh(np.zeros(3), (0.5, 0.5, 1.0), 0.25)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    vents = [Vent(np.array([0.25, 0.25, z]), 1e-4) for z in (0.9, 1.1)]
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.5, WaterParameters(), gas=Gas(), vents=vents)
+    found = Openings.of(water, water.air.label)
+    assert (found.one.tolist(), found.other.tolist()) == ([0], [-1])
+    assert found.area == pytest.approx([1e-4 * vents[0].discharge])
+
+
+@dataclass
+class FakeSlits:
+    """What openings read of `Slits`: difference csr (N, s), area (s,) [m²]."""
+
+    difference: csr_array
+    area: np.ndarray
+
+    def __len__(self):
+        return len(self.area)
+
+
+def test_air_passes_through_cracks_between_two_airs_alone():
+    """Of five slits with two nodes each: between two pockets, and two between one of them and the open air, which count
+    as one opening; not from a pocket to water, and not within a pocket."""
+    label = np.array([1, 2, OPEN_AIR, NO_AIR, 2, 2])
+    ends = np.array([(0, 1), (2, 0), (1, 3), (4, 5), (0, 2)])
+    columns = np.repeat(np.arange(5), 2)
+    difference = csr_array((np.tile([1.0, -1.0], 5), (ends.ravel(), columns)), shape=(6, 5))
+    slits = FakeSlits(difference, 1e-4 * np.array([1.0, 2.0, 4.0, 8.0, 16.0]))
+    found = Openings.of(SimpleNamespace(vents=(), slits=slits), label)
+    assert list(zip(found.one.tolist(), found.other.tolist())) == [(0, -1), (1, 0)]
+    np.testing.assert_allclose(found.area, [18e-4, 1e-4])
 
 
 def test_bubbles_that_the_mesh_does_not_see_are_let_go():
