@@ -1,6 +1,7 @@
 """The structure in motion: substeps, their length, energies, the state at rest (theory 1.3 to 1.5).
 
 structure, readings       what others set up and move; what they read of it
+faces_at_start            what becomes of the faces that touch as a scene begins
 description               what is checked and derived from the list of blocks before it is built
 substep, spin             one substep; free rotation of bodies with unequal inertias
 timestep                  how long a substep may be

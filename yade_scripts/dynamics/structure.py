@@ -13,12 +13,13 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from yade_scripts.blocks.block import Block, BlockError
-from yade_scripts.blocks.faces import FixedPlane, TouchingFaces, both_held, touching_faces
+from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import Parted
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.description import check_names, local_origin, matched_stiffness, moved_block
 from yade_scripts.dynamics.energy import EnergySums, Masses
+from yade_scripts.dynamics.faces_at_start import FacesAtStart
 from yade_scripts.dynamics.impulses import Impulses, ImpulseSums
 from yade_scripts.dynamics.onset import ContactOnset, loose_at_start, moves
 from yade_scripts.dynamics.readings import StructureReadings
@@ -99,7 +100,7 @@ class Structure(StructureReadings):
         local = [moved_block(b, -origin) for b in blocks]
         local_planes = [replace(p, point=p.point - origin) for p in self.planes]
         self.joint_rules = JointRules(joints) if isinstance(joints, JointParameters) else joints
-        faces = _Faces.of(local, local_planes, self.joint_rules, contact)
+        faces = FacesAtStart.of(local, local_planes, self.joint_rules, contact)
         self.joints = faces.joints(local, self.joint_rules)
         self._seals = Seals(local, faces.sealed) if faces.sealed else None
         self._partly = Seals(local, [face for face, _ in faces.partly]) if faces.partly else None
@@ -494,62 +495,3 @@ def _with_ground(ground: float | None, planes) -> list[FixedPlane]:
         else [FixedPlane(np.array([0.0, 0.0, ground]), np.array([0.0, 0.0, 1.0]), "ground")]
     )
     return [*floor, *planes]
-
-
-def _materials(blocks, planes, face: TouchingFaces) -> tuple[str, str]:
-    """Materials of both sides of a pair of faces."""
-    other = blocks[face.b] if face.b >= 0 else planes[-1 - face.b]
-    return blocks[face.a].material, other.material
-
-
-@dataclass(frozen=True)
-class _Faces:
-    """Touching faces: those that get a joint, those that only keep water out, those that get a share of its pressure,
-    blocks held at others that are held, and blocks that rest on others without a joint."""
-
-    joined: list[TouchingFaces]
-    laws: list[JointParameters]
-    sealed: list[TouchingFaces]
-    partly: list[tuple[TouchingFaces, float]]
-    held_rows: list[int]
-    resting_rows: list[int]
-
-    @classmethod
-    def of(cls, blocks, planes, rules: JointRules | None, contact: ContactLaw | None) -> _Faces:
-        if rules is None and (contact is None or not contact.keeps_water_out):
-            return cls([], [], [], [], [], [])
-        faces = touching_faces(blocks, planes)
-        laws = rules.of_faces(faces, blocks, planes) if rules is not None else [None] * len(faces)
-        joined: list[tuple[TouchingFaces, JointParameters]] = []
-        sealed: list[TouchingFaces] = []
-        partly: list[tuple[TouchingFaces, float]] = []
-        held_rows: set[int] = set()
-        resting: set[int] = set()
-        for face, law in zip(faces, laws):
-            held = both_held(blocks, face)
-            uplift = 1.0 if contact is None else contact.uplift_between(*_materials(blocks, planes, face))
-            if law is not None and not held:
-                joined.append((face, law))
-            elif law is not None or uplift == 0.0:
-                sealed.append(face)
-            elif uplift < 1.0:
-                partly.append((face, uplift))
-            rows = [row for row in (face.a, face.b) if row >= 0]
-            if law is not None and held:
-                held_rows.update(rows)
-            elif law is None and len(rows) == 2:
-                resting.update(rows)
-        return cls(
-            [face for face, _ in joined],
-            [law for _, law in joined],
-            sealed,
-            partly,
-            sorted(held_rows),
-            sorted(resting),
-        )
-
-    def joints(self, blocks, rules: JointRules | None) -> Joints | None:
-        """The joints; None where no faces are joined."""
-        if rules is None or not self.joined:
-            return None
-        return Joints(blocks, self.joined, rules.everywhere, rules.scattered(self.laws))
