@@ -80,3 +80,19 @@ def test_a_spring_turns_with_the_normal_of_its_edges_and_keeps_its_energy(turn):
     assert np.linalg.norm(spring) == pytest.approx(5.0, rel=1e-12)
     assert spring[1] > 0.0
     assert spring[0] > 0.0
+
+
+def test_springs_of_friction_hold_their_energy_at_the_time_of_the_velocities():
+    """Velocities are those half a substep before the places. A block so heavy that it keeps its own presses obliquely
+    into the ground, and friction sticks: what it loses is in the springs, to round-off at every time."""
+    block = Block("b", (0.0, 0.0, 0.25), size=0.5, density=1e6, velocity=(1.0, 0.0, -0.1))
+    law = ContactLaw(stiffness=1e5, restitution=1.0, friction=50.0)
+    with Structure([block], law, ground=0.0, gravity=(0.0, 0.0, 0.0), substep=1e-3) as structure:
+        start = structure.energies()["kinetic"]
+        for _ in range(10):
+            structure.advance(5e-3)
+            found = structure.energies()
+            gone = start - found["kinetic"] - found["dashpot"] - found["friction"]
+            assert gone == pytest.approx(found["contact_stored"], rel=1e-6)
+    assert found["friction"] == 0.0
+    assert found["contact_stored"] > 1.0
