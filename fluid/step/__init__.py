@@ -1,6 +1,6 @@
 """One step of the water, split around the pressure solve (theory 2.2).
 
-water                       the state, and `predict` and `correct` around the solve
+water, water_readings       the state, and `predict` and `correct` around the solve; what others read of it
 start                       surface, velocity and fluxes at the start
 moved_solids                the state carried to a domain cut anew
 predictor, corrector        the two halves of a step

@@ -10,13 +10,13 @@ from fluid.numerics.fields import is_nothing, less
 from fluid.surface.volume import nodal_volume
 
 if TYPE_CHECKING:
-    from fluid.step.water import Water
+    from fluid.step.water_readings import WaterReadings
 
 LEVEL_HALVINGS = 40
 """Halvings of the range of heights in which the level is sought."""
 
 
-def potential_energy(water: Water) -> float:
+def potential_energy(water: WaterReadings) -> float:
     """-∫ ρ g·x dV [J] above the floor of the tank, where the surface is.
 
     What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
@@ -29,14 +29,14 @@ def potential_energy(water: Water) -> float:
     return found + p.density * (water.volume() - water.conserved_volume) * surface
 
 
-def _at_surface(water: Water) -> float:
+def _at_surface(water: WaterReadings) -> float:
     """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""
     t, listed = water.topology, water.listed
     near = listed[np.abs(t.in_cells(water.level_set)[listed]) < 0.5 * water.mesh.spacing]
     return float(water.below_floor(t.nodes[near]).mean()) if len(near) else 0.0
 
 
-def level_energy(water: Water) -> float:
+def level_energy(water: WaterReadings) -> float:
     """Potential energy [J] above the floor of the tank of the water at a level, which an open side may bound."""
     t, p, weight = water.topology, water.parameters, water.parameters.weight
     height = -(t.nodes @ weight) / max(p.gravity, 1e-300)

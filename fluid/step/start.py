@@ -32,6 +32,7 @@ def start_beside_sides(water: Water, level, given, velocity) -> None:
     them: a side at its own level at the start would give water that it takes back in the first step. What such a
     side reads depends on the surface that its level makes, so this goes on until both agree."""
     water.level_set, water.velocity = level, np.zeros((len(level), 3)) if velocity is None else velocity
+    assert water.sides is not None  # they are what it starts beside
     absorbers, close = water.sides.absorbers(), AT_LEVEL * water.mesh.spacing
     for _ in range(MOST_READINGS):
         heights = [absorber.height for absorber in absorbers]
