@@ -10,6 +10,7 @@ import contextlib
 import os
 import signal
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 FILE_NAME = "stop"
@@ -28,7 +29,7 @@ class StopRequest:
     def __init__(self, directory: Path):
         self.file = Path(directory) / FILE_NAME
         self._reason: str | None = None
-        self._before: dict[int, object] = {}
+        self._before: dict[signal.Signals, Callable | int | None] = {}
         self._terminals: list[int] = []
 
     def __enter__(self) -> StopRequest:
@@ -42,6 +43,8 @@ class StopRequest:
 
     def __exit__(self, *_) -> None:
         for number, handler in self._before.items():
+            if handler is None:  # that of a library, which Python cannot put back
+                handler = signal.SIG_DFL
             signal.signal(number, handler)
 
     def requested(self) -> str | None:
@@ -61,7 +64,9 @@ class StopRequest:
             self._leave_the_terminal()
         elif self._reason is not None:
             raise KeyboardInterrupt
-        self._reason = self._reason or f"stopped by {WHO[number]}; all steps until then are written"
+        self._reason = (
+            self._reason or f"stopped by {WHO[signal.Signals(number)]}; all steps until then are written"
+        )
 
     def _leave_the_terminal(self) -> None:
         """Redirect output after the terminal is gone: printing to it would end the run at once instead of after its

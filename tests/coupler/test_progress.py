@@ -78,6 +78,20 @@ def test_ctrl_c_asks_first_and_forces_then(tmp_path):
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_a_handler_that_was_not_set_by_python_ends_no_run(tmp_path, monkeypatch):
+    """`signal.getsignal` gives None for that of a library; to put None back is a TypeError, after the last step."""
+    before = {number: signal.getsignal(number) for number in StopRequest.SIGNALS}
+    monkeypatch.setattr(signal, "getsignal", lambda number: None)
+    try:
+        with StopRequest(tmp_path):
+            pass
+        monkeypatch.undo()
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def test_a_handler_that_a_library_installs_does_not_swallow_ctrl_c(tmp_path):
     """YADE sets its own handlers when it is imported in the middle of a run."""
     with StopRequest(tmp_path) as stop:
