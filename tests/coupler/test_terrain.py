@@ -162,6 +162,92 @@ def test_marks_of_missing_values_are_packed_numbers(tmp_path):
     np.testing.assert_array_equal(read_grid(tmp_path / "g.nc").z.T, [[1.0, np.nan, 3.0], [4.0, 5.0, 6.0]])
 
 
+def cells_of_gmt(file, x, y, z):
+    """GMT: 1 for cells, 0 for points."""
+    file.node_offset = 1
+
+
+def cells_by_range(file, x, y, z):
+    for a in (x, y):
+        a.actual_range = np.array([a[:].min() - 5.0, a[:].max() + 5.0])
+
+
+def cells_of_gdal(file, x, y, z):
+    """A grid mapping without a number, with the corner of the first cell, and the coordinate system."""
+    mapping = file.createVariable("crs", "c", ())
+    mapping.GeoTransform = b"95 10 0 75 0 -10 "
+    mapping.spatial_ref = b'PROJCS["WGS 84 / UTM zone 54N"]'
+    z.grid_mapping = b"crs"
+
+
+def cells_by_bounds(file, x, y, z):
+    """CF: a variable (n, 2) for each coordinate, which is no height."""
+    file.createDimension("two", 2)
+    for a, name in ((x, "x_bounds"), (y, "y_bounds")):
+        a.bounds = name.encode()
+        bounds = file.createVariable(name, "d", (*a.dimensions, "two"))
+        bounds[:] = np.column_stack([a[:] - 5.0, a[:] + 5.0])
+
+
+def points_of_gmt(file, x, y, z):
+    file.node_offset = 0
+
+
+@pytest.mark.parametrize(
+    ("mark", "rim"),
+    [(cells_of_gmt, 5), (cells_by_range, 5), (cells_of_gdal, 5), (cells_by_bounds, 5), (points_of_gmt, 0)],
+)
+def test_heights_of_cells_hold_to_their_rims_where_a_netcdf_file_says_that_it_has_cells(tmp_path, mark, rim):
+    """As those of an .asc with xllcorner: three cells of 10 units cover 30, while three points cover 20."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(tmp_path / "g.nc", "w") as file:
+        made = []
+        for name, values in (("x", [100.0, 110.0, 120.0]), ("y", [70.0, 60.0])):
+            file.createDimension(name, len(values))
+            made.append(file.createVariable(name, "d", (name,)))
+            made[-1][:] = values
+        z = file.createVariable("z", "d", ("y", "x"))
+        z[:] = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+        mark(file, *made, z)
+    found = read_grid(tmp_path / "g.nc")
+    assert found.reach == ((100 - rim, 120 + rim), (60 - rim, 70 + rim))
+    np.testing.assert_array_equal(found.z, [[4, 1], [5, 2], [6, 3]])
+    assert ("UTM zone 54N" in found.crs) == (mark is cells_of_gdal)
+    placed = terrain_of(Terrain(path=str(tmp_path / "g.nc")))
+    np.testing.assert_allclose(np.diff(placed.covered), [[20 + 2 * rim], [10 + 2 * rim]])
+    if rim:
+        assert placed(np.array([30.0]), np.array([0.0])) == 6.0
+
+
+@pytest.mark.parametrize("write", [write_classic, write_hdf])
+def test_a_damaged_netcdf_file_is_refused_or_read(tmp_path, write):
+    """Cut off, or with other bytes in its head: never an error of scipy or h5py."""
+    write(tmp_path / "whole.nc")
+    whole, rng = (tmp_path / "whole.nc").read_bytes(), np.random.default_rng(3)
+    refused = 0
+    for k in range(60):
+        damaged = bytearray(whole[: rng.integers(8, len(whole))] if k % 2 else whole)
+        for place in rng.integers(4, min(len(damaged), 1200), 6):
+            damaged[place] = rng.integers(256)
+        (tmp_path / "g.nc").write_bytes(damaged)
+        try:
+            read_grid(tmp_path / "g.nc")
+        except TerrainError:
+            refused += 1
+    assert refused > 30
+
+
+def test_cells_of_a_netcdf_file_of_version_4_hold_to_their_rims_too(tmp_path):
+    import h5py
+
+    write_hdf(tmp_path / "g.nc")
+    with h5py.File(tmp_path / "g.nc", "a") as file:
+        file.attrs["node_offset"] = np.array([1], np.int32)
+        file["crs"] = np.bytes_(b"")
+    assert read_grid(tmp_path / "g.nc").reach == ((99.5, 120.5), (49.5, 62.5))
+
+
 @pytest.mark.parametrize(
     ("coordinates", "more", "reported"),
     [

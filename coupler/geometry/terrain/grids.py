@@ -1,11 +1,10 @@
-"""Terrain files → (x, y, z) of a raster, in the units of the file: ESRI grids, points, NetCDF and STL.
+"""Terrain files → (x, y, z) of a raster, in the units of the file: ESRI grids, points and STL.
 
-GeoTIFF and whatever else GDAL reads: `raster.py`, in a process of its own.
+NetCDF: `netcdf.py`. GeoTIFF and whatever else GDAL reads: `raster.py`, in a process of its own.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +13,8 @@ import numpy as np
 from array_types import Array
 from coupler.case.paths import BadPath, check_file, read_text
 from coupler.geometry.terrain.grid import Grid, TerrainError
-from coupler.program.errors import briefly, did_you_mean
+from coupler.geometry.terrain.netcdf import read_netcdf
+from coupler.program.errors import briefly
 
 EVEN = 1e-3
 """Share of a spacing by which the points of a raster may be off."""
@@ -213,148 +213,6 @@ def _triangulated(path: Path, table: Array) -> Grid:
     return Grid(axes[0], axes[1], surface(X, Y), notes=(note,))
 
 
-# ---------------------------------------------------------------- NetCDF
-
-
-def _netcdf(path: Path, variable: str | None) -> Grid:
-    """A variable of two coordinates, classic or version 4."""
-    arrays, dims, attributes = _netcdf_variables(path)
-    planes = {name: dims[name] for name, a in arrays.items() if a.ndim == 2}
-    if variable is not None and variable not in planes:
-        raise TerrainError(
-            f"{path.name}: no variable '{variable}' of two coordinates{did_you_mean(variable, planes)}"
-        )
-    if variable is None:
-        if len(planes) != 1:
-            raise TerrainError(
-                f"{path.name}: variables of two coordinates: {', '.join(planes) or 'none'}; name one as `variable`"
-            )
-        variable = next(iter(planes))
-    along, across = dims[variable]
-    for name in (along, across):
-        if name not in arrays:
-            raise TerrainError(f"{path.name}: no coordinates for '{name}' of '{variable}'")
-    eastward, northward = _directions(path, variable, (across, along), attributes)
-    x, y = (_unpacked(path, name, arrays[name], attributes[name]) for name in (eastward, northward))
-    z = _unpacked(path, variable, arrays[variable], attributes[variable])
-    degrees = "degree" in _said(attributes[eastward], "units")
-    return _even(path, x, y, z.T if eastward == across else z, "EPSG:4326" if degrees else "")
-
-
-BEGINNINGS = {"x": ("x", "lon", "east", "projection_x"), "y": ("y", "lat", "north", "projection_y")}
-"""Beginnings of the names of the coordinates that count along x and along y."""
-COMPASS = {"x": re.compile(r"degrees?_?e(ast)?"), "y": re.compile(r"degrees?_?n(orth)?")}
-"""Units that say a direction, in the spellings of the CF conventions."""
-
-
-def _directions(path: Path, variable: str, names: tuple[str, str], attributes: dict) -> tuple[str, str]:
-    """The names of the two coordinates that count along x and along y, by their attributes or else by their names."""
-    found = {_direction(name, attributes[name]): name for name in names}
-    if set(found) != {"x", "y"}:
-        raise TerrainError(
-            f"{path.name}: of the coordinates '{names[0]}' and '{names[1]}' of '{variable}' one must be known as x, "
-            "the other as y: by names that begin with x, lon or east and with y, lat or north, or by the attribute "
-            "axis, X or Y"
-        )
-    return found["x"], found["y"]
-
-
-def _direction(name: str, attributes: dict) -> str | None:
-    """x or y, where a coordinate says which of the two it is."""
-    axis, known, unit = (_said(attributes, key) for key in ("axis", "standard_name", "units"))
-    for letter, beginnings in BEGINNINGS.items():
-        if axis == letter or known.startswith(beginnings) or COMPASS[letter].fullmatch(unit):
-            return letter
-    return next((k for k, beginnings in BEGINNINGS.items() if name.lower().startswith(beginnings)), None)
-
-
-def _said(attributes: dict, key: str) -> str:
-    """The text of an attribute in small letters; empty where there is none."""
-    return str(_plain(np.ravel(attributes.get(key, ""))[0])).strip().lower()
-
-
-def _unpacked(path: Path, name: str, packed: Array, attributes: dict) -> Array:
-    """Values of a variable by the CF conventions: NaN where there is none, else packed * scale_factor + add_offset. The
-    marks of missing values are packed numbers."""
-    values = np.array(packed, float)
-    missing = [m for key in ("_FillValue", "missing_value") for m in _numbers(path, name, key, attributes)]
-    values[np.isin(values, missing)] = np.nan
-    scale = [*_numbers(path, name, "scale_factor", attributes), 1.0][0]
-    if scale == 0.0:
-        raise TerrainError(f"{path.name}: scale_factor = 0 of '{name}' leaves nothing of its values")
-    return values * scale + [*_numbers(path, name, "add_offset", attributes), 0.0][0]
-
-
-def _numbers(path: Path, name: str, key: str, attributes: dict) -> list[float]:
-    """The numbers of an attribute; none where it is absent."""
-    try:
-        return [float(value) for value in np.ravel(attributes.get(key, ()))]
-    except (TypeError, ValueError) as error:
-        raise TerrainError(f"{path.name}: {key} of '{name}' is no number ({briefly(str(error))})") from error
-
-
-def _netcdf_variables(path: Path):
-    """Arrays, names of their dimensions, and attributes of all variables."""
-    with open(path, "rb") as stream:
-        start = stream.read(4)
-    try:
-        return _classic(path) if start[:3] == b"CDF" else _version_4(path)
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise TerrainError(f"{path.name}: cannot be read as NetCDF ({briefly(str(error))})") from error
-
-
-def _classic(path: Path):
-    from scipy.io import netcdf_file
-
-    with netcdf_file(path, mmap=False) as file:
-        arrays = {name: np.array(v[:]) for name, v in file.variables.items()}
-        dims = {name: tuple(v.dimensions) for name, v in file.variables.items()}
-        attributes = {
-            name: {k: _plain(a) for k, a in v._attributes.items()} for name, v in file.variables.items()
-        }
-    return arrays, dims, attributes
-
-
-def _version_4(path: Path):
-    import h5py
-
-    arrays, dims, attributes = {}, {}, {}
-    with h5py.File(path) as file:
-        for name, data in file.items():
-            if isinstance(data, h5py.Dataset) and data.dtype.kind in "fiu":
-                arrays[name] = data[...]
-                attributes[name] = {
-                    k: _plain(data.attrs[k])
-                    for k in data.attrs
-                    if k not in ("DIMENSION_LIST", "REFERENCE_LIST")
-                }
-                dims[name] = tuple(_scale_name(d, name) for d in data.dims)
-    return arrays, dims, attributes
-
-
-def _scale_name(dimension, own: str) -> str:
-    return dimension[0].name.lstrip("/") if len(dimension) else own
-
-
-def _plain(value):
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-
-
-def _even(path: Path, x: Array, y: Array, z: Array, crs: str) -> Grid:
-    """A raster whose coordinates increase; uneven ones are refused."""
-    if x[-1] < x[0]:
-        x, z = x[::-1], z[::-1]
-    if y[-1] < y[0]:
-        y, z = y[::-1], z[:, ::-1]
-    for name, a in (("x", x), ("y", y)):
-        step = np.diff(a)
-        if not (step > 0).all() or np.ptp(step) > 2 * EVEN * step.mean():
-            raise TerrainError(f"{path.name}: its {name} are not evenly spaced; resample it (gdalwarp)")
-    return Grid(
-        np.linspace(x[0], x[-1], len(x)), np.linspace(y[0], y[-1], len(y)), np.ascontiguousarray(z), crs
-    )
-
-
 # ---------------------------------------------------------------- STL
 
 
@@ -447,8 +305,8 @@ READERS: dict[str, Callable[[Path, str | None], Grid]] = {
     ".csv": _points,
     ".txt": _points,
     ".xyz": _points,
-    ".nc": _netcdf,
-    ".grd": _netcdf,
+    ".nc": read_netcdf,
+    ".grd": read_netcdf,
     ".stl": _surface,
     ".ply": _surface,
     ".obj": _surface,

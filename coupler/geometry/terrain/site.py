@@ -27,7 +27,7 @@ LONELY = 5000.0
 """Height [m] between the lowest or highest points of a file and all others from which they are no ground."""
 KEPT = ".terrain"
 """Folder beside the file."""
-FORMAT = 3
+FORMAT = 4
 """Version of the steps below; after a change, rasters kept before are made again."""
 FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
 MERCATOR = re.compile(r"(?:pseudo|web)[ _-]mercator|EPSG\W+(?:3857|3785|900913)\b", re.IGNORECASE)
