@@ -11,8 +11,11 @@ from coupler.case.case import Case
 from coupler.case.types import Problem
 from coupler.checks.inflow_volumes import inflow_volume_problems
 from coupler.checks.inflows import inflow_remarks, side_problems, struck
-from coupler.geometry.cell_sizes import has_equal_cells, places_in_box, widest_cell
-from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured
+from coupler.geometry.bodies import Body
+from coupler.geometry.cell_sizes import cells_at, has_equal_cells, places_in, places_in_box, widest_cell
+from coupler.geometry.parts import parts_of
+from coupler.geometry.solids import solids_of
+from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured, mesh_of, on_side
 from coupler.scene.build_water import SLACK, level_at_start
 
 UPWARDS = np.array([0.0, 0.0, 1.0])
@@ -63,15 +66,34 @@ def water_remarks(case: Case) -> Iterator[str]:
 def _rough_remarks(case: Case) -> Iterator[str]:
     """Roughness that sticks out of the cells on it: the log law is that of water over it, not among it."""
     k, tank = case.water.roughness if case.water else None, case.tank
-    if k is None or tank is None or not is_measured(tank):
+    if k is None or tank is None or not is_measured(tank) or k <= finest_cell(tank):
         return
-    cell = finest_cell(tank)
+    cell = _finest_on_walls(case)
     if k > cell:
         yield (
-            f"water.roughness = {k:.3g} m is larger than the finest cells ({cell:.3g} m): the log law describes the "
-            "flow above the roughness, and in cells smaller than it friction grows without a limit as they are "
-            f"refined; where such cells lie on walls take them larger than {k:.2g} m, or a bed by water.manning"
+            f"water.roughness = {k:.3g} m is larger than the finest cells on walls, solids and blocks ({cell:.3g} m): "
+            "the log law describes the flow above the roughness, and in cells smaller than it friction grows without a "
+            f"limit as they are refined; take cells larger than {k:.2g} m there, or a bed by water.manning"
         )
+
+
+def _finest_on_walls(case: Case) -> float:
+    """Size [m] of the smallest cells on closed sides that are not smooth, on solids and on blocks at the start."""
+    tank, water = case.tank, case.water
+    if has_equal_cells(tank):
+        return tank.cell
+    mesh = mesh_of(tank)
+    centre = mesh.nodes[mesh.boundary_faces].mean(axis=1)
+    free = {*tank.open, *tank.smooth, *(spec.side for spec in (*water.inflow, *water.sea))}
+    off = [on_side(mesh, side, mesh.boundary_normal, centre) for side in free]
+    rough = ~np.any(off, axis=0) if off else np.full(len(centre), True)
+    sizes = [mesh.local_size[mesh.boundary_cell[rough]]]
+    blocks = [Body.of_block(block) for part in parts_of(case) for block in part.blocks]
+    for body in (*(solid.body for solid in solids_of(case)), *blocks):
+        places = places_in(body)
+        inside = ((places >= mesh.bounds[0]) & (places <= mesh.bounds[1])).all(axis=1)
+        sizes.append(cells_at(tank, places[inside]))
+    return float(np.concatenate(sizes).min(initial=np.inf))
 
 
 def _without_effect(case: Case) -> Iterator[Problem]:

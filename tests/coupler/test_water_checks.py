@@ -575,5 +575,29 @@ def test_a_roughness_larger_than_the_cells_is_remarked_on():
     """In cells of 0.1 m: the log law holds over the stones of a bed, and not among them."""
     rough = {"walls": "friction", "roughness": 0.3}
     (said,) = [text for text in remarks(case(rough)) if "roughness" in text]
-    assert "water.roughness = 0.3 m is larger than the finest cells" in said
+    assert (
+        "water.roughness = 0.3 m is larger than the finest cells on walls, solids and blocks (0.1 m)" in said
+    )
     assert not [text for text in remarks(case(rough | {"roughness": 0.01})) if "roughness" in text]
+
+
+@pytest.mark.parametrize(
+    ("finer", "more", "finest"),
+    [
+        ({"refine": [{"lower": [0.8, 0.05, 0.45], "upper": [1.2, 0.15, 0.55]}]}, {}, None),
+        ({"refine": [{"lower": [0.8, 0.0, 0.0], "upper": [1.2, 0.2, 0.1]}]}, {}, "0.05 m"),
+        ({"stretch": [{"along": "x", "lower": 0.0, "upper": 0.1, "cell": 0.0125}]}, {}, "0.05 m"),
+        (
+            {"refine": [{"around": ["post"], "margin": 0.05}]},
+            {"solid": [{"name": "post", "centre": [1, 0.1, 0.6], "size": [0.1, 0.1, 0.1]}]},
+            "0.05 m",
+        ),
+    ],
+)
+def test_a_roughness_is_compared_with_the_cells_that_have_walls(finer, more, finest):
+    """Finer cells at the surface, in the middle of the water, feel no wall: only those of the bed, of sides that are
+    neither open nor smooth, and of bodies count. A cell of 12.5 x 100 x 100 mm counts as a cube of 50 mm."""
+    water = {"walls": "friction", "roughness": 0.08}
+    made, _ = measured(case(water, tank=TANK | finer, **more))
+    found = [text for text in remarks(made) if "is larger than the finest" in text]
+    assert [finest in text for text in found] == ([] if finest is None else [True])
