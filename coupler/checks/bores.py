@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.water import BoreInflow
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
 from coupler.geometry.tank_mesh import mean_bed
@@ -69,9 +70,8 @@ def bores(case: Case) -> Iterator[Bore]:
             continue
         axis, inward = "xyz".index(spec.side[0]), 1.0 if spec.side[1] == "-" else -1.0
         bed = mean_bed(case.tank, spec.side, spec.level)
-        depth, velocity = spec.level - bed, bore_velocity(case, spec)
+        depth, velocity, front = at_side(case, spec)
         ahead = 0.0 if spec.ahead is None else spec.ahead - bed
-        front = velocity * depth / (depth - ahead) if ahead > 0.0 else velocity + 2.0 * math.sqrt(g * depth)
         start = (case.tank.lower if inward > 0 else case.tank.upper)[axis]
         face = (low if inward > 0 else high)[axis]
         step = max(float(low[2]) - bed, 0.0)
@@ -98,6 +98,16 @@ def bores(case: Case) -> Iterator[Bore]:
             against_wall=against_wall(*there, g) if there[0] > 0.0 else 0.0,
             arrival=way,
         )
+
+
+def at_side(case: Case, spec: BoreInflow) -> tuple[float, float, float]:
+    """Depth [m] and velocity [m/s] of a bore where it comes in, and speed [m/s] of its front over the bed there."""
+    bed = mean_bed(case.tank, spec.side, spec.level)
+    depth, velocity = spec.level - bed, bore_velocity(case, spec)
+    ahead = 0.0 if spec.ahead is None else spec.ahead - bed
+    if ahead > 0.0:
+        return depth, velocity, velocity * depth / (depth - ahead)
+    return depth, velocity, velocity + 2.0 * math.sqrt(case.case.gravity * depth)
 
 
 def in_words(bore: Bore) -> str:
