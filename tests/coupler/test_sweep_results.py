@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from html import unescape
 
 import numpy as np
@@ -368,12 +369,21 @@ def test_reasons_to_doubt_runs_are_told_at_the_end_and_on_the_page(made, capsys)
 def test_runs_that_all_change_at_one_intensity_are_refused_in_words_that_fit_it():
     x = np.array([0.6, 0.9, 0.9, 1.2])
     runs = Runs(x, np.array([0, 0, 1, 1]), 0, 0, 0)
-    assert "draw strengths" in refusal(runs, [1], ["cracked"], drawn=False)
-    said = refusal(runs, [1], ["cracked"], drawn=True)
+    assert "draw strengths" in refusal(runs, [1], ["cracked"], drawn=False, unit="m")
+    said = refusal(runs, [1], ["cracked"], drawn=True, unit="m")
     assert said.endswith("(it would be 0); add runs at intensities around this one"), (
         "strengths are drawn already"
     )
-    assert "no run below 0.9 reached 'cracked', every run above did, and of those at 0.9 some" in said
+    assert "no run below 0.9 m reached 'cracked', every run above did, and of those at 0.9 m some" in said
+
+
+def test_a_refusal_names_the_intensities_with_their_unit_and_enough_digits():
+    """Depths of 12.31 and 12.34 m are both 12.3 m in three digits."""
+    for low, high, words in ((12.31, 12.34, "12.31 m to 12.34 m"), (0.5, 2.0, "0.5 m to 2 m")):
+        runs = Runs(np.array([low, high]), np.array([0, 1]), 0, 0, 0)
+        below, above = words.split(" to ")
+        said = refusal(runs, [1], ["cracked"], drawn=True, unit="m")
+        assert f"no run up to {below} reached 'cracked' and every run from {above} on did" in said
 
 
 def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made, capsys):
@@ -387,6 +397,8 @@ def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made, ca
     assert reported["curves"] == []
     assert "perfectly separated" in reported["refused"]
     assert "draw strengths" in reported["refused"]
+    words = r"no run up to 928.6 mm/s reached .cracked. and every run from 1.143 m/s on did"
+    assert re.search(words, reported["refused"]), reported["refused"]
     finish(spec, stopped=False)
     assert f"note: no curve of fragility '{reported['name']}': perfectly separated" in capsys.readouterr().out
 

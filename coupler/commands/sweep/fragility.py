@@ -21,6 +21,7 @@ from coupler.case.sweep import DamageState, Fragility
 from coupler.commands.sweep.fit import Fits, bootstrap, check, fit, separation
 from coupler.commands.sweep.folder import Spec
 from coupler.commands.sweep.results import FREE, Results
+from coupler.program.quantities import as_said
 
 POINTS = 121
 """Number of points of a curve."""
@@ -52,13 +53,16 @@ class Runs:
 def curves(spec: Spec, results: Results, f: Fragility) -> dict:
     """Everything about one table of [[sweep.fragility]], as plain data."""
     runs = read_runs(results, f)
+    units = {c.name: c.unit for c in results.columns}
     column = next(c for c in results.columns if c.name == f.measure)
     result = {
         "name": f.name,
         "what": f.what,
         "measure": {"name": f.measure, "what": plain_meaning(column.meaning), "unit": column.unit},
         "confidence": f.confidence,
-        "states": [{"name": s.name, "what": s.what or s.name, "rule": _rule(s)} for s in f.state],
+        "states": [
+            {"name": s.name, "what": s.what or s.name, "rule": _rule(s, units[s.quantity])} for s in f.state
+        ],
         "runs": len(runs.x),
         "unknown": runs.unknown,
         "without": runs.without,
@@ -73,7 +77,7 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
     kept, left_out = usable(runs, [s.name for s in f.state])
     result["left_out"] = left_out
     drawn = bool(spec.sweep.seeds) or any(v.distribution for v in spec.sweep.vary)
-    why = refusal(runs, kept, [s.name for s in f.state], drawn)
+    why = refusal(runs, kept, [s.name for s in f.state], drawn, column.unit)
     if why:
         return result | {"refused": why}
     state = _renumbered(runs.state, kept)
@@ -129,8 +133,10 @@ def _reached(record: dict, s: DamageState) -> bool | None:
     return False if outcome == "done" and math.isfinite(value) else None
 
 
-def _rule(s: DamageState) -> str:
-    return f"{s.quantity} ≥ {s.at_least:g}" + (", or cannot stand at the start" if s.cannot_stand else "")
+def _rule(s: DamageState, unit: str) -> str:
+    return f"{s.quantity} ≥ {as_said(s.at_least, unit)}" + (
+        ", or cannot stand at the start" if s.cannot_stand else ""
+    )
 
 
 def usable(runs: Runs, names: list[str]) -> tuple[list[int], list[str]]:
@@ -150,8 +156,9 @@ def usable(runs: Runs, names: list[str]) -> tuple[list[int], list[str]]:
     return kept, out
 
 
-def refusal(runs: Runs, kept: list[int], names: list[str], drawn: bool) -> str:
-    """Why no curve can be fitted; empty where one can. drawn: whether runs differ in more than the intensity."""
+def refusal(runs: Runs, kept: list[int], names: list[str], drawn: bool, unit: str) -> str:
+    """Why no curve can be fitted; empty where one can. drawn: whether runs differ in more than the intensity, which is
+    in `unit`."""
     if not kept:
         return "no state is reached by some of the runs and not by others; give intensities between"
     if len(np.unique(runs.x)) < 2:
@@ -160,10 +167,13 @@ def refusal(runs: Runs, kept: list[int], names: list[str], drawn: bool) -> str:
     if all(gap is not None for _, gap in parted):
         name, (low, high) = parted[0]
         if low == high:
-            where = f"no run below {low:.4g} reached '{name}', every run above did, and of those at {low:.4g} some"
+            at = as_said(low, unit)
+            where = f"no run below {at} reached '{name}', every run above did, and of those at {at} some"
             more = "add runs at intensities around this one"
         else:
-            where = f"no run up to {low:.4g} reached '{name}' and every run from {high:.4g} on did"
+            ends = [as_said(x, unit) for x in (low, high)]
+            below, above = ends if ends[0] != ends[1] else (f"{x:.7g} {unit}" for x in (low, high))
+            where = f"no run up to {below} reached '{name}' and every run from {above} on did"
             more = "add runs between these two"
         why = f"perfectly separated: {where}, so the dispersion has no likelihood maximum (it would be 0)"
         if drawn:
