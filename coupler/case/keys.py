@@ -63,10 +63,21 @@ def keys(section: type[BaseModel] = Case, above: str = "") -> tuple[Key, ...]:
     return tuple(found)
 
 
-def find(path: tuple[str | int, ...]) -> Key | None:
-    """The key at a place of the case; list places are skipped. None when the schema has no such name."""
+def find(path: tuple[str | int, ...], kind: str = "") -> Key | None:
+    """The key at a place of the case; list places are skipped. None when the schema has no such name. Names that
+    several kinds of a gauge or an inflow have are those of `kind`, else of the first."""
     names = ".".join(part for part in path if isinstance(part, str))
-    return next((key for key in keys() if key.path == names), None)
+    found = next((key for key in keys() if key.path == names), None)
+    if not kind:
+        return found
+    places = [n for n, part in enumerate(path) if isinstance(part, int)]
+    table = find(path[: places[0]]) if places else None
+    if table is None:
+        return found
+    for section in table.sections:
+        if "kind" in section.model_fields and kind in _choices(section.model_fields["kind"].annotation):
+            return next((key for key in keys(section, f"{table.path}.") if key.path == names), found)
+    return found
 
 
 def names_in(path: tuple[str | int, ...]) -> list[str]:

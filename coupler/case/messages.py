@@ -23,9 +23,9 @@ GAUGE_KINDS, INFLOW_KINDS = _kinds_of(Gauge), _kinds_of(Inflow)
 
 def explain_error(error: dict) -> tuple[KeyPath, str]:
     """Key path and message of one entry of `ValidationError.errors()`."""
-    path = _path(error["loc"])
+    path, of = _path(error["loc"])
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
-    key = find(path)
+    key = find(path, of)
     if kind == "extra_forbidden":
         return path, _unknown(path)
     if kind == "missing" and isinstance(path[-1], int):
@@ -57,13 +57,14 @@ _COMPARE = {
 }
 
 
-def _path(place: tuple) -> KeyPath:
-    """The place without the kind of a gauge or an inflow, which pydantic puts between the list place and the key."""
+def _path(place: tuple) -> tuple[KeyPath, str]:
+    """The place without the kind of a gauge or an inflow, which pydantic puts between the list place and the key, and
+    this kind; "" without one."""
     for above, kinds in ((("gauge",), GAUGE_KINDS), (("water", "inflow"), INFLOW_KINDS)):
         n = len(above) + 1
         if len(place) > n and place[: n - 1] == above and place[n] in kinds:
-            return place[:n] + place[n + 1 :]
-    return place
+            return place[:n] + place[n + 1 :], place[n]
+    return place, ""
 
 
 def _unknown(path: KeyPath) -> str:

@@ -60,7 +60,7 @@ def _comes_back(case: Case, bore: Bore, end: float) -> Iterator[str]:
     _, low, high = structure_of(case)
     if bore.step == 0.0 and _share(case, bore.side, low, high) < BLOCKS:
         return
-    what = f"the step before {bore.at}" if bore.step > 0.0 else f"'{bore.at}'"
+    what = f"the step before {bore.at}" if bore.step > 0.0 else _quoted(bore.at)
     yield from _reflected(case, spec, what, bore.arrival, end)
 
 
@@ -75,7 +75,7 @@ def _over_uneven_bed(case: Case, spec: BoreInflow, found, end: float) -> Iterato
         if max(way, 0.0) / front > end:
             yield _too_early(end, f"the bore from {spec.side}", body, way / front)
         if _share(case, spec.side, low, high) >= BLOCKS:
-            stops.append((max(way, 0.0), f"'{body}'"))
+            stops.append((max(way, 0.0), _quoted(body)))
     if stops:
         way, what = min(stops)
         yield from _reflected(case, spec, what, way / front, end)
@@ -119,8 +119,13 @@ def _reflected(case: Case, spec: BoreInflow, what: str, arrival: float, end: flo
         )
 
 
+def _quoted(body: str) -> str:
+    """The name of a part in quotes, or the structure as a whole."""
+    return body if body == "the structure" else f"'{body}'"
+
+
 def _too_early(end: float, wave: str, body: str, arrival: float) -> str:
     return (
-        f"the run ends at {end:g} s, before {wave} can reach '{body}', at t = {arrival:.3g} s or later: what stands "
-        "then has not met it; raise time.end"
+        f"the run ends at {end:g} s, before {wave} can reach {_quoted(body)}, at t = {arrival:.3g} s or later: what "
+        "stands then has not met it; raise time.end"
     )

@@ -282,6 +282,15 @@ def test_gauges_that_would_fill_the_same_place(tmp_path, gauges, reported):
     assert reported in line
 
 
+def test_a_name_that_several_kinds_have_is_explained_as_that_of_the_kind_in_the_file(tmp_path):
+    """A level gauge stands at x, y, while a patch has its centre in space."""
+    gauges = gauge("level", "a") + gauge("flux", "b", edges="[[0, 1, 0], [0, 0, 1]]") + gauge("velocity", "c")
+    at_level, at_flux, at_point = mistakes(tmp_path, WATER + gauges)
+    assert "gauge[0].at: missing; place (x, y) [m]" in at_level
+    assert "gauge[1].at: missing; centre of the patch [m]" in at_flux
+    assert "gauge[2].at: missing; point (x, y, z) [m]" in at_point
+
+
 def test_gauges_of_different_columns_may_share_a_name(tmp_path):
     gauges = gauge("level", "g", at="[1, 1]") + gauge("motion", "g", of='"a"') + gauge("loads", "g", on='"a"')
     case = load(write(tmp_path, WATER + BLOCKS + gauges)).case
