@@ -27,6 +27,8 @@ FROM_ABOVE = 0.7
 INSTANTS = 400
 TALLEST = 8.2
 """Largest height [inch] of a figure."""
+LOWEST = 1.5
+"""Least height [inch] of the figure of damage over time: its colour bar is as long as the words beside it."""
 LEFT, STAYED = "#f3d9cf", "#e4e4e4"
 """Colours of blocks that left their place, and of those that did not; openings are white."""
 
@@ -57,8 +59,9 @@ def damage_figures(run, folder, endings=FORMATS):
         drawn = {}
         if found.cracks is not None and len(found.cracks["joint"]):
             drawn["damage"] = over_time(found, parts)
-            if found.joints:
-                drawn["cracks"] = elevations(found, parts, cracks_on, crack_colours(found))
+            glued = [part for part in parts if joints_of(found, part).any()]
+            if found.joints and glued:
+                drawn["cracks"] = elevations(found, glued, cracks_on, crack_colours(found))
         if np.nanmax(found.blocks["pressure"], initial=0.0) > 0.0:
             drawn["wall_pressure"] = elevations(found, parts, pressure_on, pressure_colours(found))
         for name, drawing in drawn.items():
@@ -111,7 +114,7 @@ def over_time(found, parts):
     time = np.linspace(0.0, found.end, INSTANTS)
     share = np.array([broken_share(found, part, time) for part in parts])
     kept = [k for k in range(len(parts)) if np.isfinite(share[k]).all()]
-    drawing, axis = plt.subplots(figsize=(WIDTH, 0.9 + 0.24 * len(kept)))
+    drawing, axis = plt.subplots(figsize=(WIDTH, max(0.9 + 0.24 * len(kept), LOWEST)))
     edges = np.linspace(0.0, found.end, INSTANTS + 1)
     mesh = axis.pcolormesh(
         edges, np.arange(len(kept) + 1) - 0.5, share[kept], cmap=colours(DAMAGE_ENDS), vmin=0.0, vmax=1.0,
@@ -133,20 +136,24 @@ def over_time(found, parts):
     axis.grid(False)
     axis.set_xlabel("time [s]   (a bar marks the first block that left its place)")
     bar = drawing.colorbar(mesh, ax=axis, pad=0.02)
-    bar.set_label("broken, of the joined area")
+    bar.set_label("broken share of\nthe joined area")
     bar.ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
     return drawing
 
 
 def broken_share(found, part, time):
     """Share of the joined area of a part that is broken at each time (t,); NaN for one without joints."""
-    c, member = found.cracks, found.blocks["member"]
-    a, b = c["a"].astype(int), c["b"].astype(int)
-    own = of(member, a, part) | of(member, b, part)
+    own = joints_of(found, part)
     if not own.any():
         return np.full(len(time), np.nan)
-    broke, area = c["time"][own], c["area"][own]
+    broke, area = found.cracks["time"][own], found.cracks["area"][own]
     return np.array([area[broke <= t].sum() for t in time]) / area.sum()
+
+
+def joints_of(found, part):
+    """(J,) bool: the joints of a part, within it and with others."""
+    a, b = (found.cracks[name].astype(int) for name in ("a", "b"))
+    return of(found.blocks["member"], a, part) | of(found.blocks["member"], b, part)
 
 
 def of(member, rows, part):
@@ -246,8 +253,8 @@ def cracks_on(axis, found, part, view, coloured):
     gone = np.isfinite(found.blocks["left_at"])[rows]
     fill = np.where(gone, LEFT, STAYED)
     axis.add_collection(PolyCollection(rings, facecolors=fill, edgecolors=SHADOW, linewidths=0.4))
-    c, member = found.cracks, found.blocks["member"]
-    own = np.flatnonzero(of(member, c["a"].astype(int), part) | of(member, c["b"].astype(int), part))
+    c = found.cracks
+    own = np.flatnonzero(joints_of(found, part))
     broken = own[c["intact"][own] == 0]
     mappable = coloured[0]
     seen = [(view.flat(found.joints[k]), k) for k in broken]
