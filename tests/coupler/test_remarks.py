@@ -17,13 +17,21 @@ FINE_BOX = {"refine": [{"lower": [0, 0, 0], "upper": [3, 8, 2], "levels": 2}]}
         ({}, True),
         ({"contact": {"stiffness": 1e9, "pair": [{"materials": ["block", "tank"], "friction": 0}]}}, False),
         ({"joints": {"strength": 1e5, "opening_at_failure": 1e-3}}, False),
+        (
+            {
+                "joints": {"strength": 1e5, "opening_at_failure": 1e-3},
+                "tank": {"lower": [0, 0, 0], "upper": [4, 1, 3], "cell": 0.5, "smooth": ["y-", "y+"]},
+            },
+            True,
+        ),
         ({"tank": {"lower": [0, 0, 0], "upper": [4, 2, 3], "cell": 0.5}}, False),
         ({"tank": {"lower": [0, 0, 0], "upper": [4, 1, 3], "cell": 0.5, "open": ["z+", "y+"]}}, False),
     ],
-    ids=["a slice", "no friction", "joined", "a gap", "an open side"],
+    ids=["a slice", "no friction", "joined", "joined between symmetry planes", "a gap", "an open side"],
 )
-def test_loose_blocks_from_side_to_side_of_a_slice_are_remarked(changes, remarked):
-    """Their friction on the sides carries a load that a longer wall does not have, and kept one standing."""
+def test_blocks_from_side_to_side_of_a_slice_are_remarked(changes, remarked):
+    """Their friction on the sides carries a load that a longer wall does not have, and kept one standing; a glued wall
+    that has broken from its foot bends between symmetry planes."""
     wall = {"name": "w", "lower": [2, 0, 0], "size": [0.5, 1, 2], "block": [0.5, 0.5, 0.5]}
     tank = {"lower": [0, 0, 0], "upper": [4, 1, 3], "cell": 0.5}
     made = case(**{"structure": {"wall": [wall]}, "contact": {"stiffness": 1e9}, "tank": tank} | changes)
