@@ -10,9 +10,10 @@ gauges                                       gauges: places, and what they would
 air, bores, inflow_volumes                   trapped air, bores where they meet a structure, volumes of inflows
 arrivals, records                            waves that come after the end of the run; records of inflows
 supports                                     what carries blocks: parts that hang, a ground off the floor of the tank
+on_land                                      houses on a terrain above the water, or in water thin for the cells
 fronts                                       fronts on dry beds with friction, over cells that are too high
 gaps, insides                                gaps beside thin walls, narrower than a cell; buildings full of water
-sides                                        loose blocks that rub on the sides of a slice
+sides                                        blocks that rub on the sides of a slice
 tables                                       results that would be written to one place
 unit_slips                                   values for which most likely another unit was meant
 

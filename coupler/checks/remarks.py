@@ -13,6 +13,7 @@ from coupler.checks.fronts import front_remarks
 from coupler.checks.gaps import gap_remarks
 from coupler.checks.gauges import gauge_remarks
 from coupler.checks.insides import inside_remarks
+from coupler.checks.on_land import land_remarks
 from coupler.checks.sides import side_remarks
 from coupler.checks.softness import softness_remarks
 from coupler.checks.supports import support_remarks
@@ -40,6 +41,7 @@ def remarks(case: Case) -> list[str]:
         *water_remarks(case),
         *front_remarks(case),
         *arrival_remarks(case),
+        *land_remarks(case),
         *material_remarks(case),
         *_joint_remarks(case),
         *_loose_remarks(case),

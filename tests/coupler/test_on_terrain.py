@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from coupler.checks.on_land import land_remarks
 from coupler.checks.read_case import load
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
@@ -155,3 +156,38 @@ def test_blocks_that_begin_in_the_terrain_are_refused(tmp_path):
         loaded(tmp_path, loose.format(clear - 0.01))
     fixed = '[structure]\n[[structure.block]]\nname = "pile"\ncentre = [10, 5, 4]\nsize = [1, 1, 4]\nfixed = true\n'
     assert loaded(tmp_path, fixed + '[contact]\nstiffness = "1 GN/m"\n').case
+
+
+WAVE = """
+[water]
+[[water.fill]]
+lower = [0, 0, -1]
+upper = [2, 12, 0.5]
+[[water.inflow]]
+kind = "bore"
+side = "x-"
+ahead = 0.5
+level = 7
+absorbs = true
+"""
+
+
+def test_a_house_above_the_water_or_in_thin_water_is_remarked_on(tmp_path):
+    """Its foot stands 0.3 m over the highest ground under it, at z = 5.6 m."""
+
+    def said(level, *sets):
+        made = loaded(tmp_path, HOUSE + WAVE, f"water.inflow[0].level={level}", *sets).case
+        return [text for text in land_remarks(made)]
+
+    foot = min(b.world_vertices()[:, 2].min() for b in parts_of(loaded(tmp_path, HOUSE).case)[0].blocks)
+    (thin,) = said(foot + 1.5)
+    assert f"at 'h' water up to z = {foot + 1.5:.3g} m is 1.5 m deep, 1.5 cells of 1 m: under 3 cells" in thin
+    assert "around" in thin
+    assert said(foot + 3.1) == []
+    (dry,) = said(foot - 0.1)
+    assert (
+        f"'h' stands above all levels of the water (z = {foot - 0.1:.3g} m): only what runs up can reach it"
+        in dry
+    )
+    assert said(foot - 0.1, "water.fill[0].upper[2]=10") == []
+    assert list(land_remarks(loaded(tmp_path, HOUSE).case)) == [], "no water"
