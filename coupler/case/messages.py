@@ -117,7 +117,8 @@ def _is(key: Key | None) -> str:
     unit = f" [{key.unit}]" if key.unit else ""
     name = key.path.rsplit(".", 1)[-1]
     if key.sections:
-        return f"write a section [{key.path}]: {key.description}"
+        head = f"[[{key.path}]]" if key.several else f"[{key.path}]"
+        return f"write a section {head}: {key.description}"
     example = f", for instance {name} = {key.example}" if key.example else ""
     return f"{key.description}{unit}{example}"
 

@@ -291,6 +291,13 @@ def test_a_name_that_several_kinds_have_is_explained_as_that_of_the_kind_in_the_
     assert "gauge[2].at: missing; point (x, y, z) [m]" in at_point
 
 
+def test_a_missing_table_that_may_be_repeated_is_named_in_double_brackets(tmp_path):
+    """[study.quantity], as it was named, is refused again."""
+    quantity, ladder = mistakes(tmp_path, WATER + "[study]\n")
+    assert "study.quantity: missing; write a section [[study.quantity]]: what is measured" in quantity
+    assert "study.ladder: missing; write a section [[study.ladder]]: what is varied" in ladder
+
+
 def test_gauges_of_different_columns_may_share_a_name(tmp_path):
     gauges = gauge("level", "g", at="[1, 1]") + gauge("motion", "g", of='"a"') + gauge("loads", "g", on='"a"')
     case = load(write(tmp_path, WATER + BLOCKS + gauges)).case
