@@ -104,7 +104,7 @@ def _options(sets: list[str]) -> dict:
 def _draw(ground, title: str, picture: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder) / "ground.npz"
-        np.savez(there, x=ground.x, y=ground.y, z=ground.z)
+        np.savez(there, x=ground.x, y=ground.y, z=ground.z, covered=np.array(ground.covered))
         done = run_module(
             "coupler.commands.view.terrain_map", there, picture, title, capture_output=True, text=True
         )
