@@ -123,6 +123,24 @@ def test_a_caption_of_several_lines_stands_above_the_tank(tmp_path):
     assert rim < below
 
 
+def test_pressures_of_trapped_air_stand_below_the_caption(tmp_path):
+    """They were written over its second and third line."""
+    run = write_run(tmp_path / "run", [0.0], cell=4.0)
+    (run / "run.json").write_text(json.dumps({"case": {"case": {"title": "A long title of a case " * 3}}}))
+    code = (
+        "from coupler.commands.view.run_files import open_run; from coupler.commands.view.scene import Scene;"
+        f"scene = Scene(open_run({str(run)!r}), (640, 360), soft=False); scene.draw(0.0);"
+        "[scene._tell(k, f'air {k}: 5 kPa', 'black') for k in (0, 1)]; scene.picture();"
+        "seen, ends = scene.plotter.renderer, [];\n"
+        "for name in ('caption', 'pocket0_told', 'pocket1_told'):\n"
+        "    text, size = scene.plotter.actors[name], [0.0, 0.0]; text.GetSize(seen, size)\n"
+        "    top = 360 * text.GetPositionCoordinate().GetValue()[1]; ends += [top, top - size[1]]\n"
+        "print(*ends); scene.close()"
+    )
+    ends = list(map(float, told(code).split()))
+    assert ends == sorted(ends, reverse=True), "top and lower end of each, one below the other"
+
+
 def test_the_picture_of_a_case_has_a_legend_that_can_be_read(tmp_path):
     """Names had the pale colours of what they name, in letters of a fourth of the picture, and half of it was empty."""
     faces = box_vertices((4.0, 1.0, 1.0))[np.array(BOX_FACES)]

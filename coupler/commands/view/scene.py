@@ -122,6 +122,11 @@ class Scene:
         caption.prop.justification_horizontal = "right"
         caption.prop.justification_vertical = "top"
 
+    def _caption_end(self):
+        """How far below the top of the picture the caption ends, as share of its height."""
+        line = CAPTION_LINE * self._points(7) / self.size[1]
+        return CAPTION_TOP + line * (len(self.caption.splitlines()) + 0.5)
+
     def _set_lights(self, headlight):
         """Add one sun, a weak light from the right and one from the camera; the light is soft, and no face is black."""
         span = np.linalg.norm(self.upper - self.lower)
@@ -135,9 +140,7 @@ class Scene:
     def _set_camera(self, azimuth, elevation, eye):
         angle = angle_of(azimuth, elevation)
         below = 0.055 if angle == FAR else 0.0  # the label of the scale bar
-        above = CAPTION_TOP + CAPTION_LINE * self._points(7) / self.size[1] * (
-            len(self.caption.splitlines()) + 0.5
-        )
+        above = self._caption_end()
         view = eye or frame(
             self.lower,
             self.upper,
@@ -289,13 +292,15 @@ class Scene:
             self._tell(MOST_POCKETS, f"and {len(drawn) - MOST_POCKETS} more", palette.INK)
 
     def _tell(self, line, words, colour):
-        """Write a line in the upper right corner."""
+        """Write a line in the upper right corner, below the caption."""
+        below = self._caption_end() + 0.042 * self.letters * line
         text = self.plotter.add_text(
-            words, name=f"pocket{line}_told", position=(0.985, 0.935 - 0.042 * self.letters * line),
+            words, name=f"pocket{line}_told", position=(0.985, 1.0 - below),
             viewport=True, font_size=self._points(11), color=colour, render=False,
         )  # fmt: skip
         lettered(text.prop)
         text.prop.justification_horizontal = "right"
+        text.prop.justification_vertical = "top"
 
     def _sides(self):
         """Corners of a tank whose sides are all flat; None of a basin of another shape."""
