@@ -107,8 +107,12 @@ def changed(table: dict, override: str) -> dict:
     try:
         Case.model_validate(found)
     except ValidationError as error:
-        mistakes = [explain_error(item) for item in error.errors()]
-        lines = [_line(place, text, places) for place, text in mistakes if place[: len(path)] == path]
+        mistakes = [(item["type"], *explain_error(item)) for item in error.errors()]
+        lines = [
+            _line(place, text, places)
+            for kind, place, text in mistakes
+            if place[: len(path)] == path or (kind == "extra_forbidden" and path[: len(place)] == place)
+        ]
         if lines:
             raise BadCase(lines) from None
     return found
@@ -199,10 +203,13 @@ class _Places:
         return next((text for given, text in self.overrides.items() if path[: len(given)] == given), None)
 
     def __call__(self, path: KeyPath) -> str:
-        override = self._override(path)
+        line, override = self.line(path), self._override(path)
+        if path and not line:  # a section that is not in the file, and in which an override gives a value
+            override = next(
+                (text for given, text in self.overrides.items() if given[: len(path)] == path), None
+            )
         if override:
             return f"--set {_cut(override)}"
-        line = self.line(path)
         return f"{self.name}:{line}" if line else self.name
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from coupler.case.paths import BadPath, read_text
-from coupler.program.errors import FULL, ExitCode, SurgebreakError
+from coupler.program.errors import FULL, ExitCode, SurgebreakError, did_you_mean
 from coupler.results.storage import DiskFull, NotFinite, WrongShape
 
 
@@ -51,7 +51,8 @@ class History:
     def __getitem__(self, name):
         """The values of a column. Raises BadTable where there is none of that name."""
         if name not in self.values:
-            raise BadTable(f"the table '{self.title}' has no column '{name}'")
+            hint = did_you_mean(name, self.values) or f". It has {', '.join(self.values)}"
+            raise BadTable(f"the table '{self.title}' has no column '{name}'{hint}")
         return self.values[name]
 
 

@@ -52,6 +52,12 @@ def dry():
             r"tank\.uper: unknown name; did you mean 'upper'\?",
         ),
         ("time[+]", 1, r"\[\+\] adds to a list"),
+        (
+            "gaugee[+]",
+            {"kind": "level"},
+            r"^--set gaugee\[\+\]=.*: gaugee: unknown name; did you mean 'gauge'\?",
+        ),
+        ("tankk.cell", 1, r"^--set tankk.cell=1: tankk: unknown name; did you mean 'tank'\?"),
     ],
 )
 def test_a_wrong_change_is_refused_at_once_and_changes_nothing(key, value, reported):

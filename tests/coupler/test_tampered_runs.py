@@ -139,8 +139,10 @@ def test_tables_that_no_run_wrote(copy, content):
 def test_a_column_that_is_missing_is_reported(copy):
     path = copy / "history" / "energy.csv"
     path.write_text("# energy\n# time [s]: t\ntime\n1\n", encoding="utf-8")
-    with pytest.raises(BadTable, match="the table 'energy' has no column 'energy_error'"):
+    with pytest.raises(BadTable, match=r"the table 'energy' has no column 'energy_error'\. It has time"):
         report(copy, False)
+    with pytest.raises(BadTable, match=r"no column 'tme'; did you mean 'time'\?"):
+        read_history(path)["tme"]
 
 
 @pytest.mark.parametrize("name", ["blocks.vtkhdf", "fields.vtkhdf"])
