@@ -363,7 +363,7 @@ class Structure(StructureReadings):
 
     def _still_hold(self) -> bool:
         """Whether joints that held before a substep still do."""
-        return self._substepper.fastest <= QUIET and self.joints.holding()
+        return self.joints is not None and self._substepper.fastest <= QUIET and self.joints.holding()
 
     def _turn_on_contacts(self) -> None:
         """Before a step, switch contacts on for pieces that have left their position."""
