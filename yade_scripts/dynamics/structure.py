@@ -349,7 +349,8 @@ class Structure(StructureReadings):
         """Take dt [s] in `count` substeps, or in others from where a block woke or a joint began to soften: joints that
         failed in each, and how many there were."""
         broken: list[Array] = []
-        left, length, holding = count, dt / count, self._joints_hold()
+        left, length = count, dt / count
+        holding = self._substep is None and substep is None and self._joints_hold()
         while left:
             broken.append(self._one_substep(length))
             left -= 1
