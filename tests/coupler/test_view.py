@@ -244,6 +244,12 @@ water = S(nodes=x, cells=grid.cells_dict[10].astype(int), level_set=x[:, 2] - 1.
 y, at = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.7, 0.0])
 cut = section.with_section(pv.PolyData(), water, y, at)
 print(round(cut.area, 6), round(float(cut["speed"].max()), 6))
+water.fraction[:] = 0.3
+inside = pv.Box((0.5, 1.5, 0, 2, 0.25, 1))
+inside.cell_data["solid"] = np.zeros(6, int)
+bent = pv.merge([pv.Box((0, 1, 0, 2, 0, 1)), pv.Box((0, 2, 0, 2, 1, 2))]).extract_surface(algorithm="dataset_surface")
+bent.cell_data["solid"] = np.zeros(bent.n_cells, int)
+print(*(round(section.with_section(pv.PolyData(), water, y, at, [body]).area, 6) for body in (inside, bent)))
 block = pv.Box((0, 2, 0, 1, 0, 3))
 block.cell_data["block"] = np.zeros(6, int)
 block.cell_data["damage"] = np.full(6, 0.5)
@@ -255,8 +261,11 @@ print(round(section.ground_behind_cut(bed, (y, at), 0.0).area, 6))
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    cut, half, solid, ground = (tuple(map(float, line.split())) for line in done.stdout.splitlines())
+    cut, around, half, solid, ground = (tuple(map(float, line.split())) for line in done.stdout.splitlines())
     assert cut == (3.0, pytest.approx(3**0.5, rel=1e-5)), "2 m of width, 1.5 m of depth"
+    assert around == (pytest.approx(3.0 - 0.75), 0.0), (
+        "around a box; none in cells mostly inside of a body with a notch"
+    )
     assert half == (pytest.approx(6.0, abs=1e-5), 0.5), "the face of the cut has the damage of its block"
     assert solid == (pytest.approx(2 * 0.7 * 3),)
     assert ground == (pytest.approx(2 * 0.7 + 2 * 1),), "the bed that is kept, and the ground in the plane"

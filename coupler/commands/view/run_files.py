@@ -192,8 +192,12 @@ def _solids(path):
     if not path.exists():
         return None, None, None
     with h5py.File(path, "r", locking=False) as file:
-        scene, points = file["scene"].attrs, file["VTKHDF/Points"][:]
+        scene, points, number = file["scene"].attrs, file["VTKHDF/Points"][:], file["VTKHDF/CellData/solid"][:]
         tank = scene["tank"] - scene["origin"] if "tank" in scene else None
         basin = file["scene/basin"][:] - scene["origin"] if "basin" in file["scene"] else None
     faces = faces_for_vtk(*vtkhdf.read_polygons(path))
-    return (pv.PolyData(points, faces) if len(points) else None), tank, basin
+    if len(points) == 0:
+        return None, tank, basin
+    solids = pv.PolyData(points, faces)
+    solids.cell_data["solid"] = number
+    return solids, tank, basin

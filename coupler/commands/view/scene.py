@@ -84,11 +84,12 @@ class Scene:
     def draw(self, time):
         """Put the stored step nearest to `time` [s] into the window; return its time [s]."""
         time = self.run.nearest(time)
-        if self.run.blocks:
-            self._draw_blocks(solid_behind_cut(self.run.blocks.at(time), self.cut))
+        blocks = self.run.blocks.at(time) if self.run.blocks else None
+        if blocks is not None:
+            self._draw_blocks(solid_behind_cut(blocks, self.cut))
         if self.run.water:
             water = self.run.water.at(time)
-            self._draw_water(water)
+            self._draw_water(water, [body for body in (self.run.solids, blocks) if body is not None])
             self._draw_pockets(water)
         self._draw_time(time)
         self.plotter.reset_camera_clipping_range()
@@ -244,12 +245,12 @@ class Scene:
                 self.plotter.actors["blocks"].mapper, "damage of blocks [–]", 0.35 if self.run.water else 0.03
             )
 
-    def _draw_water(self, grid):
+    def _draw_water(self, grid, bodies):
         white = self.fastest if self.foam else None
         surface = water_surface(grid, np.array(self.plotter.camera.position), self._sides(), white)
         surface = self._behind_cut(surface)
         if self.cut is not None:
-            surface = with_section(surface, grid, *self.cut)
+            surface = with_section(surface, grid, *self.cut, bodies)
         if surface.n_cells == 0:
             self.plotter.remove_actor("water", reset_camera=False, render=False)
             return

@@ -6,16 +6,24 @@ import pyvista as pv
 from coupler.commands.view.water_surface import WHOLE, some
 
 
-def with_section(surface, water, normal, origin):
+def with_section(surface, water, normal, origin, bodies=()):
     """The surface of the water behind a cut, and the water in the plane of the cut itself.
 
     surface: what `water_surface` gives, cut off · water: as stored · normal (3,) towards the eye and origin (3,) [m] of
-    the plane. In cells that a body cuts, the section is left out where more than half of the cell is in the body."""
-    wet = some((water.level_set < 0.0)[water.cells]) & (water.fraction > 0.5 * WHOLE)
+    the plane · bodies: blocks and fixed solids, whose sections are taken off that of the water where they are convex.
+    In cells that others cut, the section is left out where more than half of the cell is in the body."""
+    convex = [body for mesh in bodies for body in _bodies(mesh)]
+    least = 0.0 if all(map(_is_convex, convex)) and convex else 0.5 * WHOLE
+    wet = some((water.level_set < 0.0)[water.cells]) & (water.fraction > least)
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: water.cells[wet]}, water.nodes)
     grid["level_set"], grid["velocity"] = water.level_set, water.velocity
+    grid.cell_data["fraction"] = np.asarray(water.fraction)[wet]
     plane = grid.slice(normal=normal, origin=origin).triangulate()
     plane = plane.clip_scalar(scalars="level_set", value=0.0) if plane.n_cells else plane
+    if plane.n_cells:
+        plane = _outside(
+            plane, [_ring_of(body, normal, origin) for body in convex if _is_convex(body)], normal
+        )
     if plane.n_cells == 0:
         return surface
     section = plane.extract_surface(algorithm="dataset_surface").triangulate()
@@ -31,6 +39,26 @@ def with_section(surface, water, normal, origin):
     return whole
 
 
+def _outside(plane, rings, normal):
+    """The part of a plane mesh outside of convex polygons (k, 3) in it; only cells with less than their whole volume of
+    water can lie inside."""
+    cut = np.asarray(plane.cell_data["fraction"]) < WHOLE
+    pieces, near = [plane.extract_cells(np.flatnonzero(~cut))], plane.extract_cells(np.flatnonzero(cut))
+    for corners in (ring for ring in rings if len(ring) >= 3):
+        beyond = []
+        middle = corners.mean(axis=0)
+        for start, end in zip(corners, np.roll(corners, -1, axis=0)):
+            out = np.cross(end - start, normal)
+            out = out if out @ (start - middle) > 0.0 else -out
+            if near.n_cells and np.linalg.norm(out) > 0.0:
+                beyond.append(near.clip(normal=out, origin=start, invert=False))
+                near = near.clip(normal=out, origin=start)
+        kept = [part for part in beyond if part.n_cells]
+        near = pv.merge(kept) if kept else pv.UnstructuredGrid()
+    pieces = [piece for piece in (*pieces, near) if piece.n_cells]
+    return pv.merge(pieces) if pieces else pv.UnstructuredGrid()
+
+
 def solid_behind_cut(blocks, cut):
     """Blocks behind a cut (normal (3,), origin (3,) [m]), or None for all, with the faces that the cut makes; these
     have the data of their block."""
@@ -39,17 +67,13 @@ def solid_behind_cut(blocks, cut):
     normal, origin = np.asarray(cut[0], float), np.asarray(cut[1], float)
     kept = blocks.clip(normal=normal, origin=origin, crinkle=False)
     faces = [kept] if kept.n_cells else []
-    for rows in _rows_of_blocks(blocks):
-        one = blocks.extract_cells(rows).extract_surface(algorithm="dataset_surface")
-        side = (np.asarray(one.points, float) - origin) @ normal
-        if side.min() >= 0.0 or side.max() <= 0.0:
-            continue
-        corners = _ring(one.slice(normal=normal, origin=origin).points, normal)
+    for body in _bodies(blocks):
+        corners = _ring_of(body, normal, origin)
         if len(corners) < 3:
             continue
         face = pv.PolyData(corners, [len(corners), *range(len(corners))])
         for name in blocks.cell_data:
-            face.cell_data[name] = blocks.cell_data[name][rows[:1]]
+            face.cell_data[name] = body.cell_data[name][:1]
         faces.append(face)
     return faces[0].append_polydata(*faces[1:]) if faces else kept
 
@@ -82,11 +106,28 @@ def ground_behind_cut(bed, cut, foot):
     return kept.append_polydata(pv.PolyData(np.concatenate([line, under]), quads.ravel()))
 
 
-def _rows_of_blocks(blocks):
-    """The faces of each block, as rows."""
-    number = np.asarray(blocks.cell_data["block"])
+def _bodies(mesh):
+    """The surface of each block or fixed solid of a mesh of faces."""
+    number = np.asarray(mesh.cell_data["block" if "block" in mesh.cell_data else "solid"])
     order = np.argsort(number, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
+    for rows in np.split(order, np.flatnonzero(np.diff(number[order])) + 1):
+        yield mesh.extract_cells(rows).extract_surface(algorithm="dataset_surface")
+
+
+def _is_convex(body):
+    """Whether no corner of a closed surface lies before the plane of one of its faces."""
+    points, normals = np.asarray(body.points, float), np.asarray(body.compute_normals().cell_normals, float)
+    middles = np.asarray(body.cell_centers().points, float)
+    side = np.einsum("fk,pfk->fp", normals, points[:, None] - middles)
+    return bool((np.minimum(side.max(axis=1), -side.min(axis=1)) <= 1e-5 * body.length).all())
+
+
+def _ring_of(body, normal, origin):
+    """The corners (k, 3) of the section of a convex body, in their order around it; none where the plane passes it."""
+    side = (np.asarray(body.points, float) - origin) @ normal
+    if side.min() >= 0.0 or side.max() <= 0.0:
+        return np.zeros((0, 3))
+    return _ring(body.slice(normal=normal, origin=origin).points, normal)
 
 
 def _ring(points, normal):
