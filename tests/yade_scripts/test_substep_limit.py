@@ -118,8 +118,9 @@ def test_blocks_that_fly_apart_begin_with_short_substeps():
 @pytest.mark.parametrize("law", ["polynomial", "exponential", "bilinear"])
 @pytest.mark.parametrize("speed", [0.1, 0.5])
 def test_the_substep_of_joints_keeps_their_energy(law, speed):
-    """A wall of sixteen blocks thrown about in its joints, up to a fiftieth and to half of their damage: it gains no
-    energy, and the account misses a hundred-thousandth at most of what it was given."""
+    """A wall of sixteen blocks thrown about in its joints, which are damaged by a tenth and by half, all the time in
+    substeps that are taken only while joints hold: it gains no energy, and the account misses a hundred-thousandth at
+    most of what it was given. (With the bilinear law and a closing ratio of 4 it gains 0.6 %.)"""
     random = np.random.default_rng(1)
     blocks = []
     for i in range(4):
@@ -130,7 +131,8 @@ def test_the_substep_of_joints_keeps_their_energy(law, speed):
             blocks.append(Block(f"b{i}{k}", centre, size=size, density=2000.0, fixed=k == 0, **motion))
     with Structure(blocks, None, replace(JOINT, law=law), gravity=STILL) as s:
         watch = Watch(s, s.energies()["kinetic"])
-        watch.advance(1000 * s.substep())
+        substep = HOLDING_SHARE * s.substep_limit().stable
+        watch.advance(600 * substep, substep=substep)
         assert watch.gain <= 1e-5 * watch.scale
         assert watch.drift <= 1e-5 * watch.scale
         assert s.joint_table().damage.max() > 0.5 * speed

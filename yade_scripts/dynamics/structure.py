@@ -304,17 +304,16 @@ class Structure(StructureReadings):
         return self.stable_substep()[0] if self._substep is None else self._substep
 
     def advance(self, dt: float, substep: float | None = None) -> AdvanceReport:
-        """Advance by dt [s] under the load of `set_load`, in equal substeps no longer than `substep`, by default that
-        of the structure. Raises SubstepTooLong where the motion would be unstable."""
+        """Advance by dt [s] under the load of `set_load`, in substeps no longer than `substep`, by default that of the
+        structure. Raises SubstepTooLong where the motion would be unstable."""
         m = self._motion
         self._turn_on_contacts()
         if self._sleep is not None:
             self._sleep.begin(self.weight_now() + self._substepper.load, self.time, self._substepper.ramp)
-        count = self.count_substeps(dt, substep)
         x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
         self._substepper.fastest = 0.0
         self._impulses.start()
-        broken, count = self._substeps(dt, count, substep)
+        broken, count = self._substeps(dt, substep)
         m.read()
         self._check_finite()
         turn = m.turned_since(R0)
@@ -338,6 +337,7 @@ class Structure(StructureReadings):
         return self._count(dt, substep, self.substep_limit())
 
     def _count(self, dt: float, substep: float | None, most: SubstepLimit) -> int:
+        """Number of equal substeps in a time dt [s], as long as `substep`, the one of the structure, or else `most`."""
         asked = self._substep if substep is None else substep
         limit = most.dt if asked is None else asked
         most.check(min(limit, dt))
@@ -345,12 +345,14 @@ class Structure(StructureReadings):
             return 1
         return max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
 
-    def _substeps(self, dt: float, count: int, substep: float | None) -> tuple[list[Array], int]:
-        """Take dt [s] in `count` substeps, or in others from where a block woke or a joint began to soften: joints that
+    def _substeps(self, dt: float, substep: float | None) -> tuple[list[Array], int]:
+        """Take dt [s] in equal substeps, and in others from where a block woke or a joint began to soften: joints that
         failed in each, and how many there were."""
         broken: list[Array] = []
-        left, length = count, dt / count
-        holding = self._substep is None and substep is None and self._joints_hold()
+        holding = self._joints_hold()
+        left = self._count(dt, substep, self._limit_of(holding))
+        length = dt / left
+        holding = holding and self._substep is None and substep is None
         while left:
             broken.append(self._one_substep(length))
             left -= 1

@@ -192,7 +192,11 @@ def _solids(path):
     if not path.exists():
         return None, None, None
     with h5py.File(path, "r", locking=False) as file:
-        scene, points, number = file["scene"].attrs, file["VTKHDF/Points"][:], file["VTKHDF/CellData/solid"][:]
+        scene, points, number = (
+            file["scene"].attrs,
+            file["VTKHDF/Points"][:],
+            file["VTKHDF/CellData/solid"][:],
+        )
         tank = scene["tank"] - scene["origin"] if "tank" in scene else None
         basin = file["scene/basin"][:] - scene["origin"] if "basin" in file["scene"] else None
     faces = faces_for_vtk(*vtkhdf.read_polygons(path))

@@ -12,8 +12,9 @@ def with_section(surface, water, normal, origin, bodies=()):
     surface: what `water_surface` gives, cut off · water: as stored · normal (3,) towards the eye and origin (3,) [m] of
     the plane · bodies: blocks and fixed solids, whose sections are taken off that of the water where they are convex.
     In cells that others cut, the section is left out where more than half of the cell is in the body."""
-    convex = [body for mesh in bodies for body in _bodies(mesh)]
-    least = 0.0 if all(map(_is_convex, convex)) and convex else 0.5 * WHOLE
+    cut = [body for mesh in bodies for body in _bodies(mesh) if _passes(body, normal, origin)]
+    convex = [body for body in cut if _is_convex(body)]
+    least = 0.0 if convex and len(convex) == len(cut) else 0.5 * WHOLE
     wet = some((water.level_set < 0.0)[water.cells]) & (water.fraction > least)
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: water.cells[wet]}, water.nodes)
     grid["level_set"], grid["velocity"] = water.level_set, water.velocity
@@ -21,9 +22,7 @@ def with_section(surface, water, normal, origin, bodies=()):
     plane = grid.slice(normal=normal, origin=origin).triangulate()
     plane = plane.clip_scalar(scalars="level_set", value=0.0) if plane.n_cells else plane
     if plane.n_cells:
-        plane = _outside(
-            plane, [_ring_of(body, normal, origin) for body in convex if _is_convex(body)], normal
-        )
+        plane = _outside(plane, [_ring_of(body, normal, origin) for body in convex], normal)
     if plane.n_cells == 0:
         return surface
     section = plane.extract_surface(algorithm="dataset_surface").triangulate()
@@ -68,7 +67,7 @@ def solid_behind_cut(blocks, cut):
     kept = blocks.clip(normal=normal, origin=origin, crinkle=False)
     faces = [kept] if kept.n_cells else []
     for body in _bodies(blocks):
-        corners = _ring_of(body, normal, origin)
+        corners = _ring_of(body, normal, origin) if _passes(body, normal, origin) else ()
         if len(corners) < 3:
             continue
         face = pv.PolyData(corners, [len(corners), *range(len(corners))])
@@ -108,6 +107,8 @@ def ground_behind_cut(bed, cut, foot):
 
 def _bodies(mesh):
     """The surface of each block or fixed solid of a mesh of faces."""
+    if mesh.n_cells == 0:
+        return
     number = np.asarray(mesh.cell_data["block" if "block" in mesh.cell_data else "solid"])
     order = np.argsort(number, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(number[order])) + 1):
@@ -122,11 +123,14 @@ def _is_convex(body):
     return bool((np.minimum(side.max(axis=1), -side.min(axis=1)) <= 1e-5 * body.length).all())
 
 
-def _ring_of(body, normal, origin):
-    """The corners (k, 3) of the section of a convex body, in their order around it; none where the plane passes it."""
+def _passes(body, normal, origin):
+    """Whether a plane goes through a body."""
     side = (np.asarray(body.points, float) - origin) @ normal
-    if side.min() >= 0.0 or side.max() <= 0.0:
-        return np.zeros((0, 3))
+    return side.min() < 0.0 < side.max()
+
+
+def _ring_of(body, normal, origin):
+    """The corners (k, 3) of the section of a convex body, in their order around it."""
     return _ring(body.slice(normal=normal, origin=origin).points, normal)
 
 
