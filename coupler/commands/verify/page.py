@@ -97,14 +97,15 @@ ALWAYS = {
     "the force depends on where jet and plate lie between the nodes, and a single place says little: the reported rows "
     "have mean, standard deviation and worst of eight, and [where the load is "
     "lost](variants.md#where-a-sheet-on-two-cells-loses-its-load) was found by a balance of momentum.",
-    "P61": "The wave is the solitary wave of 0.0307 m that the benchmark prescribes; the gauge before the inflow recorded"
-    " 0.0279 m ([what that changes](variants.md#fluxes-through-the-planes-of-the-medians-on-meshes-that-fit-a-bed))."
-    " The side behind the island lets waves out. Cells at the shore are 8 cm wide. With the island moved by 0, 1, −1 and 10 mm along the wave an earlier "
-    "version had 0.080, 0.078, 0.091 and 0.080 m facing the wave and 0.078, 0.090, 0.083 and 0.079 m in the lee, and "
-    "another one 0.093 and 0.094 m. A part of that was a fault: once in a while the shift of the surface was solved "
-    "wrongly on flat cells, and water that was going back rose by 3 cm in one step ([theory]"
-    "(theory.md#25-cells-of-several-sizes-and-meshes-that-end-on-a-bed)). How much the figures depend on the place of "
-    "the island without it was not measured.",
+    "P61": "The wave is the solitary wave of 0.0307 m that the benchmark prescribes; the gauge before the inflow "
+    "recorded 0.0279 m ([what that "
+    "changes](variants.md#fluxes-through-the-planes-of-the-medians-on-meshes-that-fit-a-bed)). The side behind"
+    " the island lets waves out. Cells at the shore are 8 cm wide. With the island moved by 0, 1, −1 and 10 mm"
+    " along the wave an earlier version had 0.080, 0.078, 0.091 and 0.080 m facing the wave and 0.078, 0.090, "
+    "0.083 and 0.079 m in the lee, and another one 0.093 and 0.094 m. A part of that was a fault: once in a "
+    "while the shift of the surface was solved wrongly on flat cells, and water that was going back rose by 3 "
+    "cm in one step ([theory](theory.md#25-cells-of-several-sizes-and-meshes-that-end-on-a-bed)). How much the"
+    " figures depend on the place of the island without it was not measured.",
 }
 """What has to be known to judge the figures of a case, whether it passes or not."""
 
